@@ -1,0 +1,397 @@
+"""The maze: free space, base pose and goal; read from and written to GeoJSON."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike
+from shapely.geometry import LineString, MultiPolygon, Point, Polygon, mapping, shape
+from shapely.geometry.polygon import orient
+from shapely.validation import explain_validity
+
+from hrsnake_env.arm import ArmSpec, FloatArray
+from hrsnake_env.errors import InputError
+
+__all__ = ["Maze"]
+
+MITRE_LIMIT = 10.0
+"""Corridor corners sharper than about 11 degrees are cut off; all others are square."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Maze:
+    """Hold a planar maze: where links may be, where the arm comes in, and where its tip shall go.
+
+    Behind the base stands a straight feeder along the base heading; parts of links behind the base are not
+    in the maze. The y axis points up.
+
+    Parameters
+    ----------
+    name : str
+        Shown in tables and pictures.
+    free_space : shapely Polygon or MultiPolygon
+        The space not in walls; holes are obstacles. Of several parts, the one with the base is kept.
+    base_pose : array-like, shape (3,)
+        (x, y, heading) of the base, in maze units and rad.
+    goal : array-like, shape (2,)
+        In maze units.
+    goal_radius : float
+        The goal is reached when the tip is at most this far from it; positive.
+    units : str
+        Name of the maze's length unit.
+
+    Raises
+    ------
+    InputError
+        If the free space is empty or invalid, the base or the goal is not in it, or no free way joins them.
+    """
+
+    name: str
+    free_space: Polygon
+    base_pose: FloatArray
+    goal: FloatArray
+    goal_radius: float
+    units: str = "px"
+
+    def __post_init__(self) -> None:
+        base_pose = _frozen_array(self.base_pose, (3,), "base_pose (x, y, heading)")
+        goal = _frozen_array(self.goal, (2,), "goal (x, y)")
+        if not (math.isfinite(self.goal_radius) and self.goal_radius > 0.0):
+            raise InputError(f"Expected a positive, finite goal radius, got {self.goal_radius!r}.")
+        parts = _checked_parts(self.free_space)
+        base, tip = Point(base_pose[:2]), Point(goal)
+        for role, point in (("base", base), ("goal", tip)):
+            if not any(part.contains(point) for part in parts):
+                raise InputError(
+                    f"Expected the {role} inside the free space, got ({point.x:g}, {point.y:g}), "
+                    f"which is on or behind a wall."
+                )
+        part = next(part for part in parts if part.contains(base))
+        if not part.contains(tip):
+            raise InputError(
+                f"Expected a free way from the base to the goal, but ({tip.x:g}, {tip.y:g}) lies in "
+                f"another part of the free space than ({base.x:g}, {base.y:g})."
+            )
+        object.__setattr__(self, "free_space", orient(_without_collinear_vertices(part)))
+        object.__setattr__(self, "base_pose", base_pose)
+        object.__setattr__(self, "goal", goal)
+        object.__setattr__(self, "goal_radius", float(self.goal_radius))
+
+    def __repr__(self) -> str:
+        return f"Maze({self.name!r}, {len(self.walls)} walls)"
+
+    @property
+    def rings(self) -> Iterator[FloatArray]:
+        """Yield the walls as closed rings, shape (n_vertices + 1, 2), with the free space on the left."""
+        yield np.asarray(self.free_space.exterior.coords, dtype=np.float64)[:, :2]
+        for hole in self.free_space.interiors:
+            yield np.asarray(hole.coords, dtype=np.float64)[:, :2]
+
+    @property
+    def walls(self) -> FloatArray:
+        """Start and end of each wall segment, shape (n_walls, 2, 2), with the free space on the left."""
+        return np.concatenate([np.stack([ring[:-1], ring[1:]], axis=1) for ring in self.rings])
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the free space's bounding box, in maze units."""
+        x_min, y_min, x_max, y_max = self.free_space.bounds
+        return math.hypot(x_max - x_min, y_max - y_min)
+
+    def check_arm(self, arm: ArmSpec) -> None:
+        """Check that the arm can leave the feeder: one link length in front of the base is straight and free.
+
+        Raises
+        ------
+        InputError
+            If the link is longer than the maze, or the first link length is not free.
+        """
+        if arm.link_length > self.size:
+            raise InputError(
+                f"Expected a link_length of at most the size of maze '{self.name}' ({self.size:g} "
+                f"{self.units}), got {arm.link_length:g}."
+            )
+        x, y, heading = self.base_pose
+        ray = LineString(
+            [
+                (x, y),
+                (x + arm.link_length * math.cos(heading), y + arm.link_length * math.sin(heading)),
+            ]
+        )
+        walls = self.free_space.boundary
+        inside = self.free_space.covers(ray)
+        if inside and (arm.link_radius == 0.0 or _front_clearance(ray, walls) >= arm.link_radius):
+            return
+        free = 0.0 if arm.link_radius > 0.0 and inside else _free_length(ray, walls)
+        raise InputError(
+            f"Expected one link length ({arm.link_length:g} {self.units}) of straight free way in front of "
+            f"the base of maze '{self.name}' for a link of radius {arm.link_radius:g}, got {free:g}."
+        )
+
+    # Reading and writing
+
+    @classmethod
+    def load(cls, source: str | os.PathLike[str]) -> Maze:
+        """Load a named maze, or a maze file (GeoJSON).
+
+        Parameters
+        ----------
+        source : str or path
+            One of `hrsnake_env.mazes.MAZES`, or the path of a `.geojson` or `.json` file.
+
+        Raises
+        ------
+        InputError
+            If there is no such maze, or the file does not hold one.
+
+        Examples
+        --------
+        >>> Maze.load("fig19").goal
+        array([240., 700.])
+        """
+        from hrsnake_env.mazes import MAZES  # the named mazes are built from this class
+
+        text = os.fspath(source)
+        if text in MAZES:
+            return MAZES[text]()
+        if Path(text).suffix.lower() not in (".geojson", ".json"):
+            raise InputError(
+                f"Unknown maze {text!r}. Available: {', '.join(MAZES)}; or give the path of a .geojson file."
+            )
+        return cls.from_geojson(_read_json(Path(text)), default_name=Path(text).stem)
+
+    @classmethod
+    def from_geojson(cls, data: Any, *, default_name: str = "maze") -> Maze:
+        """Build a maze from a GeoJSON FeatureCollection.
+
+        Features by `properties.role`: `free` (Polygon with holes: the free space), `base` (Point, with
+        `heading_deg`) and `goal` (Point, with `radius`); `name` and `units` stand at the top.
+
+        Raises
+        ------
+        InputError
+            If a feature is missing, or does not hold what its role needs.
+        """
+        if not isinstance(data, dict) or data.get("type") != "FeatureCollection":
+            kind = data.get("type") if isinstance(data, dict) else type(data).__name__
+            raise InputError(f"Expected a GeoJSON FeatureCollection, got {kind!r}.")
+        features = _features_by_role(data.get("features"))
+        free = [_geometry(feature, "free", ("Polygon", "MultiPolygon")) for feature in features["free"]]
+        base, goal = features["base"][0], features["goal"][0]
+        base_point = _geometry(base, "base", ("Point",))
+        goal_point = _geometry(goal, "goal", ("Point",))
+        heading = math.radians(_number(base, "base", "heading_deg"))
+        return cls(
+            name=str(data.get("name", default_name)),
+            free_space=free[0] if len(free) == 1 else _union(free),
+            base_pose=np.array([base_point.x, base_point.y, heading]),
+            goal=np.array([goal_point.x, goal_point.y]),
+            goal_radius=_number(goal, "goal", "radius"),
+            units=str(data.get("units", "px")),
+        )
+
+    def to_geojson(self) -> dict[str, Any]:
+        """Return the maze as a GeoJSON FeatureCollection (the inverse of `from_geojson`)."""
+        x, y, heading = (float(value) for value in self.base_pose)
+
+        def feature(geometry: Any, **properties: Any) -> dict[str, Any]:
+            return {"type": "Feature", "properties": properties, "geometry": mapping(geometry)}
+
+        return {
+            "type": "FeatureCollection",
+            "name": self.name,
+            "units": self.units,
+            "features": [
+                feature(self.free_space, role="free"),
+                feature(Point(x, y), role="base", heading_deg=math.degrees(heading)),
+                feature(Point(self.goal), role="goal", radius=self.goal_radius),
+            ],
+        }
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the maze as GeoJSON, completely or not at all."""
+        target = Path(path)
+        part = target.with_name(target.name + ".part")
+        part.write_text(json.dumps(self.to_geojson(), indent=1) + "\n", encoding="utf-8")
+        part.replace(target)
+
+    @classmethod
+    def from_corridors(
+        cls,
+        centrelines: ArrayLike | Sequence[ArrayLike],
+        width: float | Sequence[float],
+        *,
+        name: str = "corridors",
+        goal: ArrayLike | None = None,
+        goal_radius: float | None = None,
+        base_offset: float = 5.0,
+        units: str = "px",
+    ) -> Maze:
+        """Build a maze from corridors: centrelines with a width, square mitred corners and flat ends.
+
+        Parameters
+        ----------
+        centrelines : array-like, shape (n, 2), or a sequence of them
+            Waypoints of each centreline; the base stands `base_offset` from the start of the first, along
+            its first leg.
+        width : float, or a sequence with one per centreline
+            In maze units.
+        goal : array-like, shape (2,), optional
+            By default half a width before the end of the last centreline.
+        goal_radius : float, optional
+            By default an eighth of the last width.
+
+        Examples
+        --------
+        >>> bend = Maze.from_corridors([(0, 0), (0, 900), (900, 900)], 200.0)
+        >>> bend.free_space.area
+        360000.0
+        """
+        lines = _as_centrelines(centrelines)
+        widths = [float(value) for value in np.broadcast_to(np.asarray(width, dtype=np.float64), len(lines))]
+        if not all(math.isfinite(value) and value > 0.0 for value in widths):
+            raise InputError(f"Expected a positive, finite corridor width, got {width!r}.")
+        start, along = lines[0][0], _unit(lines[0][1] - lines[0][0])
+        end, back = lines[-1][-1], _unit(lines[-1][-2] - lines[-1][-1])
+        base = start + base_offset * along
+        return cls(
+            name=name,
+            free_space=_union(
+                [
+                    LineString(line).buffer(
+                        value / 2, cap_style="flat", join_style="mitre", mitre_limit=MITRE_LIMIT
+                    )
+                    for line, value in zip(lines, widths, strict=True)
+                ]
+            ),
+            base_pose=np.array([*base, math.atan2(along[1], along[0])]),
+            goal=end + 0.5 * widths[-1] * back if goal is None else np.asarray(goal, dtype=np.float64),
+            goal_radius=widths[-1] / 8 if goal_radius is None else goal_radius,
+            units=units,
+        )
+
+
+def _frozen_array(values: ArrayLike, shape_: tuple[int, ...], what: str) -> FloatArray:
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.shape != shape_ or not np.isfinite(array).all():
+        raise InputError(f"Expected {what} as {shape_[0]} finite numbers, got {values!r}.")
+    array.setflags(write=False)
+    return array
+
+
+def _checked_parts(free_space: Any) -> list[Polygon]:
+    if not isinstance(free_space, Polygon | MultiPolygon):
+        raise InputError(
+            f"Expected the free space as a Polygon, got {getattr(free_space, 'geom_type', free_space)!r}."
+        )
+    if free_space.is_empty or free_space.area == 0.0:
+        raise InputError("Expected a free space with an area, got an empty polygon.")
+    if not free_space.is_valid:
+        raise InputError(f"Expected a valid polygon as free space, got one with: {explain_validity(free_space)}.")
+    return list(free_space.geoms) if isinstance(free_space, MultiPolygon) else [free_space]
+
+
+def _without_collinear_vertices(polygon: Polygon) -> Polygon:
+    simple = polygon.simplify(0.0)
+    return simple if simple.is_valid and simple.symmetric_difference(polygon).area == 0.0 else polygon
+
+
+def _front_clearance(ray: LineString, walls: Any) -> float:
+    """Return the distance from a ray to the walls in front of its start.
+
+    The wall that the feeder comes through is as near as one likes, so walls behind the start do not count.
+    """
+    start, end = np.asarray(ray.coords)
+    along, reach = _unit(end - start), float(np.linalg.norm(end - start))
+    across = np.array([-along[1], along[0]])
+    front = Polygon(
+        [start + reach * across, end + reach * (across + along), end - reach * (across - along), start - reach * across]
+    )
+    return float(ray.distance(walls.intersection(front)))
+
+
+def _free_length(ray: LineString, walls: Any) -> float:
+    return float(Point(ray.coords[0]).distance(ray.intersection(walls)))
+
+
+def _read_json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"Expected a maze file at '{path}', but there is none.") from None
+    except OSError as error:
+        raise InputError(f"Expected a readable maze file at '{path}', got: {error.strerror}.") from None
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"Expected JSON in '{path}', got: {error}.") from None
+
+
+def _features_by_role(features: Any) -> dict[str, list[dict[str, Any]]]:
+    by_role: dict[str, list[dict[str, Any]]] = {"free": [], "base": [], "goal": []}
+    for feature in features if isinstance(features, list) else []:
+        properties = feature.get("properties") if isinstance(feature, dict) else None
+        role = properties.get("role") if isinstance(properties, dict) else None
+        if role in by_role:
+            by_role[role].append(feature)
+    for role, found in by_role.items():
+        if not found or (role != "free" and len(found) > 1):
+            wanted = "at least one feature" if role == "free" else "exactly one feature"
+            raise InputError(f"Expected {wanted} with properties.role '{role}', got {len(found)}.")
+    return by_role
+
+
+def _geometry(feature: dict[str, Any], role: str, kinds: tuple[str, ...]) -> Any:
+    data = feature.get("geometry")
+    kind = data.get("type") if isinstance(data, dict) else data
+    if kind not in kinds:
+        raise InputError(f"Expected the '{role}' feature to be a {' or '.join(kinds)}, got {kind!r}.")
+    try:
+        geometry = shape(data)
+    except (TypeError, ValueError, KeyError, IndexError, AttributeError, shapely.errors.ShapelyError):
+        raise InputError(f"Expected {kind} coordinates in the '{role}' feature, got none that can be read.") from None
+    if geometry.is_empty or not np.isfinite(shapely.get_coordinates(geometry)).all():
+        raise InputError(f"Expected finite {kind} coordinates in the '{role}' feature, got an empty or infinite one.")
+    return shapely.force_2d(geometry)
+
+
+def _number(feature: dict[str, Any], role: str, key: str) -> float:
+    value = feature["properties"].get(key)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InputError(f"Expected a number as properties.{key} of the '{role}' feature, got {value!r}.")
+    return float(value)
+
+
+def _union(polygons: Sequence[Any]) -> Any:
+    for polygon in polygons:
+        _checked_parts(polygon)
+    # Buffers leave corners at 1e-13 beside their place; walls that should meet then do not.
+    return shapely.transform(shapely.union_all(polygons), lambda xy: np.round(xy, 9) + 0.0)
+
+
+def _as_centrelines(centrelines: ArrayLike | Sequence[ArrayLike]) -> list[FloatArray]:
+    try:
+        single = np.asarray(centrelines, dtype=np.float64)
+        lines = [single] if single.ndim == 2 else list(single)
+    except ValueError:  # corridors with different numbers of waypoints
+        lines = [np.asarray(line, dtype=np.float64) for line in centrelines]  # type: ignore[union-attr]
+    for line in lines:
+        if line.ndim != 2 or line.shape[1] != 2 or len(line) < 2 or not np.isfinite(line).all():
+            raise InputError(f"Expected each centreline with shape (n >= 2, 2), got {line.shape}.")
+    return lines
+
+
+def _unit(vector: FloatArray) -> FloatArray:
+    length = np.linalg.norm(vector)
+    if length == 0.0:
+        raise InputError("Expected different waypoints at the ends of a centreline, got the same twice.")
+    return np.asarray(vector / length, dtype=np.float64)

@@ -1,0 +1,304 @@
+"""The records that planners, the checker and the command line pass around."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hrsnake_env.arm import ArmSpec, FloatArray, configuration_from_joints, joints_from_configuration
+from hrsnake_env.errors import InputError
+from hrsnake_env.maze import Maze
+
+__all__ = ["Fault", "Motion", "PlanningResult", "PlanningStatus", "Progress", "ValidationReport"]
+
+Progress = Callable[[str, float], None]
+"""Called with the name of a stage and the share of it that is done, in [0, 1]."""
+
+KEYS = ("joints", "joint_angles", "feed", "link_length", "base_pose")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Motion:
+    """Hold a motion of the whole arm: poses in order, without time.
+
+    Between two poses feed and joint angles change linearly. All arrays are read-only.
+
+    Parameters
+    ----------
+    joints : array-like, shape (n_poses, n_links + 1, 2)
+        Joint positions, base end first, in maze units.
+    joint_angles : array-like, shape (n_poses, n_links)
+        In rad, counter-clockwise positive, without jumps of 2 pi.
+    feed : array-like, shape (n_poses,)
+        In maze units.
+    link_length : float
+        In maze units.
+    base_pose : array-like, shape (3,)
+        (x, y, heading) of the base, in maze units and rad.
+
+    Raises
+    ------
+    InputError
+        If shapes do not agree or a value is not finite.
+    """
+
+    joints: FloatArray
+    joint_angles: FloatArray
+    feed: FloatArray
+    link_length: float
+    base_pose: FloatArray
+
+    def __post_init__(self) -> None:
+        for key in ("joints", "joint_angles", "feed", "base_pose"):
+            array = np.array(getattr(self, key), dtype=np.float64)
+            array.setflags(write=False)
+            object.__setattr__(self, key, array)
+        object.__setattr__(self, "link_length", float(self.link_length))
+        n_poses, n_links = self.joint_angles.shape if self.joint_angles.ndim == 2 else (0, 0)
+        wanted = {"joints": (n_poses, n_links + 1, 2), "feed": (n_poses,), "base_pose": (3,)}
+        if n_poses == 0 or n_links == 0:
+            raise InputError(
+                f"Expected joint_angles with shape (n_poses, n_links), got {self.joint_angles.shape}."
+            )
+        for key, shape in wanted.items():
+            if getattr(self, key).shape != shape:
+                raise InputError(f"Expected {key} with shape {shape}, got {getattr(self, key).shape}.")
+        if not (np.isfinite(self.link_length) and self.link_length > 0.0):
+            raise InputError(f"Expected a positive, finite link_length, got {self.link_length!r}.")
+        if not all(np.isfinite(getattr(self, key)).all() for key in ("joints", "joint_angles", "feed", "base_pose")):
+            raise InputError("Expected a motion of finite numbers, got NaN or infinity.")
+
+    def __repr__(self) -> str:
+        return f"Motion({self.n_poses} poses, {self.n_links} links of {self.link_length:g})"
+
+    @property
+    def n_poses(self) -> int:
+        """Number of poses."""
+        return int(self.joint_angles.shape[0])
+
+    @property
+    def n_links(self) -> int:
+        """Number of links, those that never leave the feeder included."""
+        return int(self.joint_angles.shape[1])
+
+    @classmethod
+    def from_configurations(
+        cls, feed: ArrayLike, joint_angles: ArrayLike, link_length: float, base_pose: ArrayLike
+    ) -> Motion:
+        """Build a motion from feed, shape (n_poses,), and joint angles, shape (n_poses, n_links)."""
+        joints = joints_from_configuration(feed, joint_angles, link_length, base_pose)
+        return cls(
+            joints=joints,
+            joint_angles=np.asarray(joint_angles),
+            feed=np.asarray(feed),
+            link_length=link_length,
+            base_pose=np.asarray(base_pose),
+        )
+
+    @classmethod
+    def from_joints(cls, joints: ArrayLike, link_length: float, base_pose: ArrayLike) -> Motion:
+        """Build a motion from joint positions, shape (n_poses, n_links + 1, 2)."""
+        feed, joint_angles = configuration_from_joints(joints, link_length, base_pose)
+        return cls(
+            joints=np.asarray(joints),
+            joint_angles=np.unwrap(joint_angles, axis=0),
+            feed=feed,
+            link_length=link_length,
+            base_pose=np.asarray(base_pose),
+        )
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the motion as `.npz`, completely or not at all.
+
+        The keys are `joints`, `joint_angles`, `feed`, `link_length` and `base_pose`.
+        """
+        target = Path(path)
+        part = target.with_name(target.name + ".part")
+        with part.open("wb") as file:
+            np.savez_compressed(file, **{key: np.asarray(getattr(self, key)) for key in KEYS})
+        part.replace(target)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Motion:
+        """Read a motion that `save` has written.
+
+        Raises
+        ------
+        InputError
+            If the file is missing or does not hold a motion.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                if not isinstance(data, np.lib.npyio.NpzFile):
+                    raise InputError(f"Expected a motion (.npz) in '{path}', got a single array.")
+                missing = [key for key in KEYS if key not in data]
+                if missing:
+                    raise InputError(
+                        f"Expected a motion in '{path}' with the keys {', '.join(KEYS)}; "
+                        f"missing: {', '.join(missing)}."
+                    )
+                values = {key: data[key] for key in KEYS}
+        except FileNotFoundError:
+            raise InputError(f"Expected a motion file at '{path}', but there is none.") from None
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"Expected a motion (.npz) in '{path}', got a file that is not one.") from None
+        if any(values[key].dtype.kind not in "fiu" for key in KEYS) or values["link_length"].size != 1:
+            raise InputError(f"Expected a motion of numbers in '{path}', with one link_length.")
+        return cls(**{**values, "link_length": float(values["link_length"].item())})
+
+    def check_maze(self, maze: Maze) -> None:
+        """Check that the motion starts from the base of this maze.
+
+        Raises
+        ------
+        InputError
+            If it was made for another base pose.
+        """
+        if not np.allclose(self.base_pose, maze.base_pose, rtol=0.0, atol=1e-9 * self.link_length):
+            mine, others = (
+                f"({x:g}, {y:g}, {np.degrees(heading):g} deg)"
+                for x, y, heading in (self.base_pose, maze.base_pose)
+            )
+            raise InputError(
+                f"Expected a motion from the base of maze '{maze.name}' at {others}, got one from {mine}: "
+                f"it belongs to another maze."
+            )
+
+    def spec(self) -> ArmSpec:
+        """Return the arm that the motion was made for, as thin lines without joint limits."""
+        return ArmSpec(link_length=self.link_length, n_links=self.n_links)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault:
+    """Name one thing that is wrong with a motion, at its worst place.
+
+    Parameters
+    ----------
+    kind : str
+        One of the keys of `planners.validation.FAULTS`.
+    message : str
+        One sentence with figures.
+    pose : int
+        Index of the pose, or of the pose before the place between two poses.
+    link : int or None
+        Index of the link, from the base end.
+    place : tuple of two floats, or None
+        In maze units.
+    amount : float
+        How much, in maze units (rad for joint limits).
+    """
+
+    kind: str
+    message: str
+    pose: int
+    link: int | None
+    place: tuple[float, float] | None
+    amount: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class ValidationReport:
+    """Hold what the exact checker found.
+
+    Parameters
+    ----------
+    faults : tuple of Fault
+        At most one of each kind: the worst. Empty means valid.
+    clearance : float
+        Smallest signed distance of any link to the walls over all poses, in maze units; negative is the
+        penetration depth.
+    penetration : float
+        Largest penetration depth at any pose, at least 0.
+    penetration_between : float
+        Bound on the depth anywhere between poses, at least 0; infinite if no bound up to the tolerance was found.
+    largest_step : float
+        Largest movement of any joint between two poses.
+    length_error : float
+        Largest deviation of any link from its length.
+    goal_distance : float
+        From the tip of the last pose to the goal.
+    """
+
+    faults: tuple[Fault, ...]
+    clearance: float
+    penetration: float
+    penetration_between: float
+    largest_step: float
+    length_error: float
+    goal_distance: float
+
+    @property
+    def valid(self) -> bool:
+        """Whether no fault was found."""
+        return not self.faults
+
+
+class PlanningStatus(StrEnum):
+    """Say how planning ended."""
+
+    SOLVED = "solved"
+    DEAD_END = "dead end"
+    NOT_VALID = "not valid"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PlanningResult:
+    """Hold what a planner found, or why it found nothing.
+
+    Parameters
+    ----------
+    status : PlanningStatus
+        SOLVED if and only if `motion` is there and has passed the exact checker.
+    planner : str
+        Name of the planner that was used.
+    motion : Motion or None
+        The motion.
+    reason : str
+        One sentence; empty when solved.
+    place : tuple of two floats, or None
+        Where planning ended, in maze units.
+    report : ValidationReport or None
+        What the checker said of the motion that was tried.
+    timings : mapping from str to float
+        Seconds by stage: potential, path, beams, plan, poses, validate.
+    """
+
+    status: PlanningStatus
+    planner: str
+    motion: Motion | None = None
+    reason: str = ""
+    place: tuple[float, float] | None = None
+    report: ValidationReport | None = None
+    timings: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "timings", MappingProxyType(dict(self.timings)))
+
+    @property
+    def solved(self) -> bool:
+        """Whether there is a validated motion."""
+        return self.status is PlanningStatus.SOLVED
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the outcome as plain numbers and strings, without the motion's arrays."""
+        return {
+            "status": str(self.status),
+            "planner": self.planner,
+            "reason": self.reason,
+            "place": self.place,
+            "n_poses": None if self.motion is None else self.motion.n_poses,
+            "n_links": None if self.motion is None else self.motion.n_links,
+            "timings": dict(self.timings),
+        }
