@@ -295,7 +295,7 @@ def _checked_parts(free_space: Any) -> list[Polygon]:
         raise InputError(
             f"Expected the free space as a Polygon, got {getattr(free_space, 'geom_type', free_space)!r}."
         )
-    if free_space.is_empty or free_space.area == 0.0:
+    if free_space.is_empty:
         raise InputError("Expected a free space with an area, got an empty polygon.")
     if not free_space.is_valid:
         raise InputError(f"Expected a valid polygon as free space, got one with: {explain_validity(free_space)}.")

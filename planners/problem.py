@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hrsnake_env.arm import ArmSpec, FloatArray, configuration_from_joints, joints_from_configuration
+from hrsnake_env.arm import FloatArray, configuration_from_joints, joints_from_configuration
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 
-__all__ = ["Fault", "Motion", "PlanningResult", "PlanningStatus", "Progress", "ValidationReport"]
+__all__ = ["Candidate", "Fault", "Motion", "PlanningResult", "PlanningStatus", "Progress", "ValidationReport"]
 
 Progress = Callable[[str, float], None]
 """Called with the name of a stage and the share of it that is done, in [0, 1]."""
@@ -175,9 +175,21 @@ class Motion:
                 f"it belongs to another maze."
             )
 
-    def spec(self) -> ArmSpec:
-        """Return the arm that the motion was made for, as thin lines without joint limits."""
-        return ArmSpec(link_length=self.link_length, n_links=self.n_links)
+    def with_links(self, n_links: int) -> Motion:
+        """Return the same motion of an arm with more links, which stay in the feeder.
+
+        Raises
+        ------
+        InputError
+            If the motion needs more links.
+        """
+        more = n_links - self.n_links
+        if more < 0:
+            raise InputError(f"Expected at least {self.n_links} links for this motion, got {n_links}.")
+        if more == 0:
+            return self
+        joint_angles = np.pad(self.joint_angles, ((0, 0), (more, 0)))
+        return Motion.from_configurations(self.feed, joint_angles, self.link_length, self.base_pose)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -249,8 +261,30 @@ class PlanningStatus(StrEnum):
     """Say how planning ended."""
 
     SOLVED = "solved"
+    NO_PATH = "no path"
     DEAD_END = "dead end"
     NOT_VALID = "not valid"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Candidate:
+    """Hold what one planner hands to the checker.
+
+    Parameters
+    ----------
+    status : PlanningStatus
+        SOLVED if there is a motion; it is not validated yet.
+    motion : Motion or None
+        With as many links as it needs.
+    reason, place, timings
+        As in `PlanningResult`.
+    """
+
+    status: PlanningStatus
+    motion: Motion | None = None
+    reason: str = ""
+    place: tuple[float, float] | None = None
+    timings: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

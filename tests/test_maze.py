@@ -1,0 +1,231 @@
+"""Laws of the maze, its files, and its errors."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from shapely.geometry import MultiPolygon, Polygon, box
+
+from hrsnake_env.arm import ArmSpec
+from hrsnake_env.errors import InputError
+from hrsnake_env.maze import Maze
+from hrsnake_env.mazes import LEGS, MAZES, corridor_family, fig19
+
+
+def hall(**changes):
+    """Return a square hall with a square pillar, or one changed."""
+    values = {
+        "name": "hall",
+        "free_space": Polygon(box(0, 0, 100, 100).exterior, [box(40, 40, 60, 60).exterior.coords]),
+        "base_pose": (5.0, 50.0, 0.0),
+        "goal": (90.0, 50.0),
+        "goal_radius": 3.0,
+    }
+    return Maze(**{**values, **changes})
+
+
+def collection(**roles):
+    """Return a good maze file as data, with the features of some roles changed or (None) left out."""
+    good = {
+        "free": {"geometry": {"type": "Polygon", "coordinates": [[[0, 0], [9, 0], [9, 9], [0, 9], [0, 0]]]}},
+        "base": {"geometry": {"type": "Point", "coordinates": [1, 5]}, "heading_deg": 0.0},
+        "goal": {"geometry": {"type": "Point", "coordinates": [8, 5]}, "radius": 0.5},
+    }
+    features = []
+    for role, parts in {**good, **roles}.items():
+        if parts is not None:
+            properties = {key: value for key, value in parts.items() if key != "geometry"}
+            features.append({"type": "Feature", "properties": {"role": role, **properties}, "geometry": parts["geometry"]})
+    return {"type": "FeatureCollection", "name": "box", "units": "m", "features": features}
+
+
+@pytest.mark.parametrize("name", MAZES)
+def test_named_mazes_survive_the_round_trip_through_a_file(name, tmp_path):
+    maze = Maze.load(name)
+    path = tmp_path / "maze.geojson"
+    maze.save(path)
+    again = Maze.load(path)
+    assert again.free_space.equals(maze.free_space)
+    np.testing.assert_array_equal(again.goal, maze.goal)
+    np.testing.assert_allclose(again.base_pose, maze.base_pose, atol=1e-15)
+    assert (again.name, again.units, again.goal_radius) == (maze.name, maze.units, maze.goal_radius)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_holes_survive_the_round_trip():
+    maze = hall()
+    assert Maze.from_geojson(json.loads(json.dumps(maze.to_geojson()))).free_space.equals(maze.free_space)
+
+
+def test_walls_have_the_free_space_on_their_left():
+    maze = hall()
+    middles = maze.walls.mean(axis=1)
+    along = maze.walls[:, 1] - maze.walls[:, 0]
+    left = middles + 1e-3 * np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
+    from shapely import contains_xy
+
+    assert contains_xy(maze.free_space, left).all()
+    assert len(maze.walls) == 8
+
+
+def test_arrays_of_a_maze_cannot_be_written():
+    with pytest.raises(ValueError, match="read-only"):
+        hall().goal[0] = 1.0
+
+
+def test_fig19_has_the_papers_lengths():
+    # Section 5.1: l1 = l2 = 200, l_max = 440 = l1 + wall + l2.
+    maze = fig19()
+    x = np.unique(maze.walls[:, 0, 0])
+    np.testing.assert_array_equal(x, [-100, 100, 140, 340])
+    np.testing.assert_array_equal(maze.goal, [240, 700])
+
+
+def test_fig19_is_the_corridor_of_its_family():
+    assert fig19().free_space.equals(corridor_family("U40").free_space)
+
+
+@pytest.mark.parametrize("inward", [1.0, 2.0, 5.0, -5.0])
+def test_fig19_moves_all_its_walls_by_the_same_amount(inward):
+    moved = fig19(l1=200 - 2 * inward, l2=200 - 2 * inward, wall=40 + 2 * inward, end_gap=200 - 2 * inward)
+    line = [(0, 0), (0, 1500), (240, 1500), (240, 0)]
+    assert moved.free_space.equals(Maze.from_corridors(line, 200 - 2 * inward).free_space)
+
+
+@pytest.mark.parametrize("name", LEGS)
+def test_families_are_200_wide_with_their_base_5_in(name):
+    maze = Maze.load(name)
+    np.testing.assert_allclose(maze.base_pose, [0.0, 5.0, math.pi / 2])
+    length = sum(float(leg[1:]) for leg in LEGS[name].split())
+    assert maze.free_space.area == pytest.approx(200.0 * length)  # square corners add what overlaps take away
+
+
+def test_corridors_are_joined_and_may_have_different_widths():
+    maze = Maze.from_corridors([[(0, 0), (0, 500)], [(0, 450), (600, 450)]], [100, 60])
+    assert maze.free_space.area == pytest.approx(100 * 500 + 60 * 550)
+    np.testing.assert_allclose(maze.goal, [570, 450])
+
+
+def test_of_several_parts_the_one_with_the_base_is_kept():
+    maze = hall(free_space=MultiPolygon([box(0, 0, 100, 100), box(200, 0, 300, 100)]))
+    assert maze.free_space.area == 10_000
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"free_space": Polygon()}, "Expected a free space with an area, got an empty polygon."),
+        ({"free_space": Polygon([(0, 0), (9, 9), (9, 0), (0, 9)])}, "Expected a valid polygon as free space"),
+        ({"free_space": "box"}, "Expected the free space as a Polygon, got 'box'."),
+        ({"base_pose": (-5.0, 50.0, 0.0)}, "Expected the base inside the free space, got (-5, 50)"),
+        ({"base_pose": (50.0, 50.0, 0.0)}, "Expected the base inside the free space, got (50, 50)"),
+        ({"base_pose": (0.0, 50.0, 0.0)}, "Expected the base inside the free space, got (0, 50)"),
+        ({"base_pose": (5.0, math.nan, 0.0)}, "Expected base_pose (x, y, heading) as 3 finite numbers"),
+        ({"base_pose": (5.0, 5.0)}, "Expected base_pose (x, y, heading) as 3 finite numbers"),
+        ({"goal": (500.0, 50.0)}, "Expected the goal inside the free space, got (500, 50)"),
+        ({"goal_radius": 0.0}, "Expected a positive, finite goal radius, got 0.0."),
+        ({"goal_radius": math.nan}, "Expected a positive, finite goal radius, got nan."),
+        (
+            {"free_space": MultiPolygon([box(0, 0, 50, 100), box(60, 0, 100, 100)])},
+            "Expected a free way from the base to the goal, but (90, 50) lies in another part",
+        ),
+    ],
+)
+def test_bad_mazes_are_refused_in_one_sentence(changes, message):
+    with pytest.raises(InputError) as raised:
+        hall(**changes)
+    assert str(raised.value).startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        ([], "Expected a GeoJSON FeatureCollection, got 'list'."),
+        ({"type": "Feature"}, "Expected a GeoJSON FeatureCollection, got 'Feature'."),
+        ({"type": "FeatureCollection"}, "Expected at least one feature with properties.role 'free', got 0."),
+        (collection(free=None), "Expected at least one feature with properties.role 'free', got 0."),
+        (collection(base=None), "Expected exactly one feature with properties.role 'base', got 0."),
+        (collection(goal=None), "Expected exactly one feature with properties.role 'goal', got 0."),
+        (
+            collection(free={"geometry": {"type": "Point", "coordinates": [1, 1]}}),
+            "Expected the 'free' feature to be a Polygon or MultiPolygon, got 'Point'.",
+        ),
+        (collection(base={"geometry": None}), "Expected the 'base' feature to be a Point, got None."),
+        (
+            collection(free={"geometry": {"type": "Polygon", "coordinates": [[[0, 0]]]}}),
+            "Expected Polygon coordinates in the 'free' feature",
+        ),
+        (
+            collection(free={"geometry": {"type": "Polygon", "coordinates": []}}),
+            "Expected finite Polygon coordinates in the 'free' feature",
+        ),
+        (
+            collection(base={"geometry": {"type": "Point", "coordinates": [1, 5]}}),
+            "Expected a number as properties.heading_deg of the 'base' feature, got None.",
+        ),
+        (
+            collection(goal={"geometry": {"type": "Point", "coordinates": [8, 5]}, "radius": "big"}),
+            "Expected a number as properties.radius of the 'goal' feature, got 'big'.",
+        ),
+    ],
+)
+def test_bad_maze_files_are_refused_in_one_sentence(data, message, tmp_path):
+    path = tmp_path / "bad.geojson"
+    path.write_text(json.dumps(data))
+    with pytest.raises(InputError) as raised:
+        Maze.load(path)
+    assert str(raised.value).startswith(message)
+    assert "\n" not in str(raised.value)
+
+
+def test_unknown_names_list_what_there_is():
+    with pytest.raises(InputError, match=r"Unknown maze 'fig20'\. Available: fig19, L, U40") as raised:
+        Maze.load("fig20")
+    assert all(name in str(raised.value) for name in MAZES)
+
+
+def test_missing_and_broken_files_are_told_apart(tmp_path):
+    with pytest.raises(InputError, match="but there is none"):
+        Maze.load(tmp_path / "none.geojson")
+    broken = tmp_path / "broken.geojson"
+    broken.write_text("{")
+    with pytest.raises(InputError, match="Expected JSON in"):
+        Maze.load(broken)
+    broken.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="Expected JSON in"):
+        Maze.load(broken)
+    with pytest.raises(InputError, match="Expected a readable maze file"):
+        (tmp_path / "folder.geojson").mkdir()
+        Maze.load(tmp_path / "folder.geojson")
+
+
+@pytest.mark.parametrize(
+    ("arm", "message"),
+    [
+        (ArmSpec(link_length=36.0), "Expected one link length (36 px) of straight free way"),
+        (ArmSpec(link_length=150.0), "Expected a link_length of at most the size of maze 'hall' (141.421 px)"),
+        (ArmSpec(link_length=34.0, link_radius=2.0), "Expected one link length (34 px) of straight free way"),
+    ],
+)
+def test_arms_that_do_not_leave_the_feeder_are_refused(arm, message):
+    with pytest.raises(InputError) as raised:
+        hall().check_arm(arm)
+    assert str(raised.value).startswith(message)
+
+
+def test_the_wall_behind_the_base_does_not_hold_a_thick_arm_back():
+    hall().check_arm(ArmSpec(link_length=30.0, link_radius=5.0 - 1e-9))
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
+@pytest.mark.parametrize("key", ["l1", "l2", "wall", "end_gap"])
+def test_fig19_refuses_bad_lengths(key, value):
+    with pytest.raises(InputError, match=f"Expected a positive, finite {key}"):
+        fig19(**{key: value})
+
+
+@pytest.mark.parametrize("width", [0.0, -5.0, math.nan])
+def test_corridors_refuse_bad_widths(width):
+    with pytest.raises(InputError, match="Expected a positive, finite corridor width"):
+        Maze.from_corridors([(0, 0), (0, 9)], width)
