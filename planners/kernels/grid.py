@@ -7,6 +7,9 @@ from numba import njit
 
 from planners.kernels.types import BoolArray, FloatArray
 
+ON_WALL = 1e-9
+"""A node this near to a wall, in cells, is on it."""
+
 
 @njit(cache=True)
 def scan_walls(
@@ -26,7 +29,7 @@ def scan_walls(
     Returns
     -------
     inside : array, shape (ny, nx)
-        By parity of the crossings along each row.
+        By parity of the crossings along each row; a node on a wall is not inside.
     blocked_x : array, shape (ny, nx)
         Whether a wall crosses between nodes (j, i) and (j, i + 1).
     blocked_y : array, shape (ny, nx)
@@ -37,6 +40,7 @@ def scan_walls(
     The caller guarantees that the grid reaches beyond the walls on all sides.
     """
     inside = np.zeros((ny, nx), dtype=np.bool_)
+    on_wall = np.zeros((ny, nx), dtype=np.bool_)
     blocked_x = np.zeros((ny, nx), dtype=np.bool_)
     blocked_y = np.zeros((ny, nx), dtype=np.bool_)
     for k in range(walls.shape[0]):
@@ -44,16 +48,19 @@ def scan_walls(
         bx, by = (walls[k, 1, 0] - x0) / cell, (walls[k, 1, 1] - y0) / cell
         # Half-open in the running coordinate, so that a vertex on a row counts once.
         for j in range(int(np.ceil(min(ay, by))), int(np.ceil(max(ay, by)))):
-            i = int(np.floor(ax + (j - ay) * (bx - ax) / (by - ay)))
+            x = ax + (j - ay) * (bx - ax) / (by - ay)
+            i = int(np.floor(x))
             blocked_x[j, i] = True
             inside[j, i + 1] ^= True
+            on_wall[j, int(np.rint(x))] |= abs(x - np.rint(x)) < ON_WALL
         for i in range(int(np.ceil(min(ax, bx))), int(np.ceil(max(ax, bx)))):
-            j = int(np.floor(ay + (i - ax) * (by - ay) / (bx - ax)))
-            blocked_y[j, i] = True
+            y = ay + (i - ax) * (by - ay) / (bx - ax)
+            blocked_y[int(np.floor(y)), i] = True
+            on_wall[int(np.rint(y)), i] |= abs(y - np.rint(y)) < ON_WALL
     for j in range(ny):
         for i in range(1, nx):
             inside[j, i] ^= inside[j, i - 1]
-    return inside, blocked_x, blocked_y
+    return inside & ~on_wall, blocked_x, blocked_y
 
 
 @njit(cache=True)

@@ -67,6 +67,10 @@ def free_directions(
     -------
     n_gaps : int
         Number of free intervals.
+
+    Notes
+    -----
+    The caller guarantees that p is not on a wall: there, every direction is blocked or none.
     """
     n = 0
     for k in range(walls.shape[0]):
