@@ -137,7 +137,8 @@ class Motion:
             If the file is missing or does not hold a motion.
         """
         try:
-            with np.load(path, allow_pickle=False) as data:
+            with open(path, "rb") as file:
+                data = np.load(file, allow_pickle=False)
                 if not isinstance(data, np.lib.npyio.NpzFile):
                     raise InputError(f"Expected a motion (.npz) in '{path}', got a single array.")
                 missing = [key for key in KEYS if key not in data]

@@ -1,0 +1,10 @@
+"""Settings of the whole suite."""
+
+import os
+
+from hypothesis import settings
+
+# Kernels are compiled at their first call, which no deadline should count.
+settings.register_profile("local", deadline=None)
+settings.register_profile("ci", deadline=None, derandomize=True)
+settings.load_profile("ci" if os.environ.get("CI") else "local")

@@ -1,0 +1,142 @@
+"""Contracts of plan(), over all planners and many mazes."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hrsnake_env.arm import ArmSpec
+from hrsnake_env.errors import InputError
+from hrsnake_env.maze import Maze
+from hrsnake_env.mazes import fig19
+from planners import PLANNERS, PlanningStatus, plan, validate
+
+EVERY = pytest.mark.parametrize("planner", PLANNERS)
+
+
+@pytest.fixture(scope="module")
+def benchmark():
+    """Return the paper's benchmark, planned at the paper's link length."""
+    return plan(fig19(), ArmSpec(link_length=430.0))
+
+
+def test_the_papers_links_pass_the_benchmark_without_penetration(benchmark):
+    # Section 5.1: 430 px of 440 px, I = 0.977 (the paper rounds to 0.98).
+    assert benchmark.status is PlanningStatus.SOLVED
+    assert benchmark.report.penetration == 0.0
+    assert benchmark.report.clearance >= 0.0
+    assert benchmark.report.penetration_between <= 1e-3 * 430.0
+
+
+@pytest.mark.parametrize("length", [150.0, 200.0, 250.0, 300.0, 350.0, 400.0, 431.2, 436.0, 439.0, 439.5])
+def test_the_beam_planner_passes_the_benchmark_with_shorter_and_longer_links(length):
+    result = plan(fig19(), ArmSpec(link_length=length), planner="beam")
+    assert result.solved, result.reason
+    assert result.report.penetration == 0.0
+
+
+@EVERY
+@pytest.mark.parametrize("degrees", [0.0, 33.0, 180.0])
+@pytest.mark.parametrize("scale", [0.01, 1.0])
+def test_planning_does_not_depend_on_place_scale_and_direction(planner, degrees, scale):
+    angle = math.radians(degrees)
+    turn = scale * np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    line = np.array([(0, 0), (0, 1500), (240, 1500), (240, 600)]) @ turn.T + (31.0, -7.0)
+    maze = Maze.from_corridors(line, 200.0 * scale)
+    result = plan(maze, ArmSpec(link_length=420.0 * scale), planner=planner)
+    assert result.solved, result.reason
+
+
+@EVERY
+def test_solved_means_that_the_checker_agrees(planner, benchmark):
+    again = validate(benchmark.motion, fig19())
+    assert again.valid
+    assert again.penetration_between == benchmark.report.penetration_between
+
+
+@EVERY
+@pytest.mark.parametrize("name", ["fig19", "L", "S0", "stairs"])
+def test_every_outcome_is_a_result_with_a_reason(planner, name):
+    maze = Maze.load(name)
+    result = plan(maze, ArmSpec(link_length=300.0), planner=planner)
+    assert (result.motion is not None) == result.solved
+    if result.solved:
+        assert result.reason == "" and result.report.valid
+        start, end = result.motion.joints[0, -1], result.motion.joints[-1, -1]
+        np.testing.assert_allclose(start, maze.base_pose[:2], atol=1e-9)
+        assert np.hypot(*(end - maze.goal)) <= maze.goal_radius
+    else:
+        assert result.reason.endswith(".") and result.place is not None
+
+
+def test_links_longer_than_the_turn_is_wide_get_a_reason_and_a_place():
+    # No rod longer than 440 passes: it must lie across both legs and the wall at some moment.
+    result = plan(fig19(), ArmSpec(link_length=445.0))
+    assert result.status is PlanningStatus.DEAD_END
+    assert result.motion is None
+    x, y = result.place
+    assert -100 <= x <= 340 and 900 <= y <= 1600
+
+
+def test_planning_twice_gives_the_same_motion(benchmark):
+    again = plan(fig19(), ArmSpec(link_length=430.0))
+    np.testing.assert_array_equal(again.motion.joints, benchmark.motion.joints)
+
+
+def test_the_result_times_its_stages(benchmark):
+    assert list(benchmark.timings) == ["potential", "path", "beams", "plan", "poses", "validate"]
+    assert all(seconds > 0.0 for seconds in benchmark.timings.values())
+
+
+def test_extra_links_stay_in_the_feeder(benchmark):
+    longer = plan(fig19(), ArmSpec(link_length=430.0, n_links=9)).motion
+    np.testing.assert_allclose(longer.joints[:, 2:], benchmark.motion.joints, atol=1e-8)
+    assert longer.n_links == 9
+
+
+@EVERY
+def test_too_few_links_are_refused_with_the_number_it_takes(planner):
+    with pytest.raises(InputError, match=r"Expected at least 7 links of 430 px .* got 6"):
+        plan(fig19(), ArmSpec(link_length=430.0, n_links=6), planner=planner)
+
+
+@EVERY
+def test_thick_links_are_planned_between_grown_walls(planner):
+    arm = ArmSpec(link_length=300.0, link_radius=15.0)
+    result = plan(fig19(), arm, planner=planner)
+    assert result.solved, result.reason
+    assert validate(result.motion, fig19(), arm).clearance >= 0.0
+    assert not validate(result.motion, fig19(), ArmSpec(link_length=300.0, link_radius=25.0)).valid
+
+
+@EVERY
+def test_links_too_thick_for_the_corridor_find_no_path(planner):
+    maze = Maze.from_corridors([[(0, 0), (0, 500)], [(0, 490), (0, 900)]], [200, 40])
+    result = plan(maze, ArmSpec(link_length=100.0, link_radius=30.0), planner=planner)
+    assert result.status is PlanningStatus.NO_PATH
+    assert "radius 30" in result.reason
+
+
+@EVERY
+def test_joint_limits_hold(planner):
+    free = plan(fig19(), ArmSpec(link_length=250.0), planner=planner)
+    largest = np.abs(free.motion.joint_angles).max()
+    limit = 0.9 * largest
+    result = plan(fig19(), ArmSpec(link_length=250.0, joint_limit=limit), planner=planner)
+    if result.solved:
+        assert np.abs(result.motion.joint_angles).max() <= limit + 1e-9
+    else:
+        assert result.motion is None
+
+
+@pytest.mark.parametrize(
+    ("arm", "planner", "message"),
+    [
+        ({"link_length": 430.0}, "beams", r"Unknown planner 'beams'\. Available: auto, beam"),
+        ({"link_length": 1596.0}, "auto", r"Expected one link length \(1596 px\) of straight free way"),
+        ({"link_length": 5000.0}, "auto", "Expected a link_length of at most the size of maze 'fig19'"),
+    ],
+)
+def test_bad_questions_are_refused_in_one_sentence(arm, planner, message):
+    with pytest.raises(InputError, match=message):
+        plan(fig19(), ArmSpec(**arm), planner=planner)
