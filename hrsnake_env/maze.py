@@ -19,6 +19,7 @@ from shapely.validation import explain_validity
 
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.errors import InputError
+from hrsnake_env.files import replacing
 
 __all__ = ["Maze"]
 
@@ -218,10 +219,8 @@ class Maze:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the maze as GeoJSON, completely or not at all."""
-        target = Path(path)
-        part = target.with_name(target.name + ".part")
-        part.write_text(json.dumps(self.to_geojson(), indent=1) + "\n", encoding="utf-8")
-        part.replace(target)
+        with replacing(path) as part:
+            part.write_text(json.dumps(self.to_geojson(), indent=1) + "\n", encoding="utf-8")
 
     @classmethod
     def from_corridors(

@@ -7,7 +7,6 @@ import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from hrsnake_env.arm import FloatArray, configuration_from_joints, joints_from_configuration
 from hrsnake_env.errors import InputError
+from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
 
 __all__ = ["Candidate", "Fault", "Motion", "PlanningResult", "PlanningStatus", "Progress", "ValidationReport"]
@@ -121,11 +121,8 @@ class Motion:
 
         The keys are `joints`, `joint_angles`, `feed`, `link_length` and `base_pose`.
         """
-        target = Path(path)
-        part = target.with_name(target.name + ".part")
-        with part.open("wb") as file:
+        with replacing(path) as part, part.open("wb") as file:
             np.savez_compressed(file, **{key: np.asarray(getattr(self, key)) for key in KEYS})
-        part.replace(target)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Motion:

@@ -1,0 +1,246 @@
+"""The `hrsnake` command: plan, validate, simulate, draw, demo.
+
+Exit codes: 0 done; 2 bad input, one sentence on stderr; 3 no plan, a motion that is not valid, or a verdict
+that is not clean. `--json` prints one JSON object instead of tables.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import click
+import typer
+
+from hrsnake_env.arm import ArmSpec
+from hrsnake_env.errors import InputError
+from hrsnake_env.maze import Maze
+from planners import tables
+from planners.planning import PLANNERS, plan
+from planners.problem import Motion, PlanningResult, Progress
+from planners.validation import validate
+
+__all__ = ["app", "main"]
+
+BAD_INPUT = 2
+NOT_CLEAN = 3
+INTERRUPTED = 130
+
+app = typer.Typer(
+    name="hrsnake",
+    help="Plan and simulate hyper-redundant arms in spaces so tight that the links pinch the walls.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+MazeArgument = Annotated[str, typer.Argument(metavar="MAZE", help="A named maze, or a .geojson file.")]
+MotionArgument = Annotated[Path, typer.Argument(metavar="MOTION", help="A motion (.npz).")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")]
+RadiusOption = Annotated[float, typer.Option("--link-radius", help="Radius of the links, in maze units.")]
+LimitOption = Annotated[float | None, typer.Option("--joint-limit", help="Largest joint angle, in degrees.")]
+
+
+@app.command("plan")
+def plan_command(
+    maze: MazeArgument,
+    link_length: Annotated[float, typer.Option("--link-length", help="In maze units.")],
+    links: Annotated[int | None, typer.Option("--links", help="By default as many as it takes.")] = None,
+    link_radius: RadiusOption = 0.0,
+    joint_limit: LimitOption = None,
+    planner: Annotated[str, typer.Option("--planner", help=f"auto, {', '.join(PLANNERS)}.")] = "auto",
+    out: Annotated[Path | None, typer.Option("--out", help="Write the motion (.npz).")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Plan a motion from the feeder to the goal, and check it exactly."""
+    _check_output(out)
+    world, arm = Maze.load(maze), _arm(link_length, links, link_radius, joint_limit)
+    with _progress(as_json) as progress:
+        result = plan(world, arm, planner, progress=progress)
+    if result.motion is not None and out is not None:
+        result.motion.save(out)
+    _print(
+        as_json,
+        {**result.to_dict(), "validation": _report_dict(result), "out": _name(out, result.motion is not None)},
+        lambda: tables.show_plan(world, arm, result, out),
+    )
+    if not result.solved:
+        raise typer.Exit(NOT_CLEAN)
+
+
+@app.command("validate")
+def validate_command(
+    maze: MazeArgument,
+    motion: MotionArgument,
+    link_radius: RadiusOption = 0.0,
+    joint_limit: LimitOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Check a motion exactly: lengths, feeder, clearance at and between poses, crossings, start and goal."""
+    world, moved = Maze.load(maze), Motion.load(motion)
+    arm = _arm(moved.link_length, moved.n_links, link_radius, joint_limit)
+    with _progress(as_json) as progress:
+        report = validate(moved, world, arm, progress)
+    _print(as_json, tables.validation_dict(report), lambda: tables.show_validation(world, moved, report))
+    if not report.valid:
+        raise typer.Exit(NOT_CLEAN)
+
+
+@app.command("simulate")
+def simulate_command(
+    maze: MazeArgument,
+    motion: MotionArgument,
+    link_radius: RadiusOption = 0.0,
+    substeps: Annotated[int, typer.Option("--substeps", help="Simulated steps per action.")] = 4,
+    out: Annotated[Path | None, typer.Option("--out", help="Write an animation (.gif).")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Drive the simulated arm along a motion, and say whether its links merely pinched the walls."""
+    from planners.rollout import simulate_motion  # needs the simulator, which other commands do not
+
+    _check_output(out)
+    world, moved = Maze.load(maze), Motion.load(motion)
+    arm = _arm(moved.link_length, moved.n_links, link_radius, None)
+    with _progress(as_json) as progress:
+        episode = simulate_motion(moved, world, arm, substeps=substeps, progress=progress)
+        if out is not None:
+            _animate(world, episode, out, progress)
+    _print(
+        as_json,
+        {"success": episode.success, "verdict": episode.report.to_dict(), "out": _name(out)},
+        lambda: tables.show_verdict(world, episode, out),
+    )
+    if not (episode.success and episode.report.clean):
+        raise typer.Exit(NOT_CLEAN)
+
+
+@app.command("draw")
+def draw_command(
+    maze: MazeArgument,
+    motion: Annotated[Path | None, typer.Argument(metavar="[MOTION]", help="A motion (.npz) to add.")] = None,
+    link_radius: RadiusOption = 0.0,
+    out: Annotated[Path | None, typer.Option("--out", help="The picture (.png, .svg, .pdf).")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Draw a maze with its global path, left (green) and right (red) beams and critical corners."""
+    from planners.drawing import draw_geometry
+
+    world = Maze.load(maze)
+    moved = None if motion is None else Motion.load(motion)
+    if moved is not None:
+        moved.check_maze(world)
+    picture = Path(f"{world.name}.png") if out is None else out
+    _check_output(picture, (".png", ".svg", ".pdf"))
+    summary = draw_geometry(world, moved, picture, link_radius)
+    _print(as_json, {**summary, "out": str(picture)}, lambda: tables.show_geometry(world, summary, picture))
+
+
+@app.command("demo")
+def demo_command(
+    out: Annotated[Path, typer.Option("--out", help="Folder for the results; made if missing.")] = Path("demo"),
+    as_json: JsonOption = False,
+) -> None:
+    """Plan, check and simulate the paper's benchmark (Fig. 19) with its links of 430 px."""
+    from planners.demo import run_demo
+
+    _check_folder(out)
+    with _progress(as_json) as progress:
+        demo = run_demo(out, progress)
+    _print(as_json, demo.to_dict(), lambda: tables.show_demo(demo))
+    if not demo.clean:
+        raise typer.Exit(NOT_CLEAN)
+
+
+def main() -> None:
+    """Run the command line: one sentence on stderr and exit code 2 for bad input, never a traceback for it."""
+    try:
+        code = app(standalone_mode=False)
+    except InputError as error:
+        sys.exit(_complain(str(error)))
+    except click.exceptions.NoArgsIsHelpError as error:
+        print(error.ctx.get_help() if error.ctx else "")
+        sys.exit(BAD_INPUT)
+    except click.ClickException as error:
+        sys.exit(_complain(error.format_message()))
+    except (KeyboardInterrupt, click.Abort):
+        print("hrsnake: stopped; no half-written file is left.", file=sys.stderr)
+        sys.exit(INTERRUPTED)
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _complain(message: str) -> int:
+    print("hrsnake: " + " ".join(message.split()), file=sys.stderr)
+    return BAD_INPUT
+
+
+def _arm(link_length: float, links: int | None, link_radius: float, joint_limit: float | None) -> ArmSpec:
+    limit = None if joint_limit is None else joint_limit * 3.141592653589793 / 180.0
+    return ArmSpec(link_length=link_length, n_links=links, link_radius=link_radius, joint_limit=limit)
+
+
+def _print(as_json: bool, data: dict[str, Any], show: Callable[[], None]) -> None:
+    if as_json:
+        print(json.dumps(data))
+    else:
+        show()
+
+
+def _report_dict(result: PlanningResult) -> dict[str, Any] | None:
+    return None if result.report is None else tables.validation_dict(result.report)
+
+
+def _name(path: Path | None, written: bool = True) -> str | None:
+    return str(path) if path is not None and written else None
+
+
+def _check_output(path: Path | None, endings: tuple[str, ...] = ()) -> None:
+    """Refuse a file that could not be written, before the work is done."""
+    if path is None:
+        return
+    if endings and path.suffix.lower() not in endings:
+        raise InputError(f"Expected a file name ending in {', '.join(endings)}, got '{path}'.")
+    if not path.parent.is_dir():
+        raise InputError(f"Expected an existing folder for '{path}', but there is no '{path.parent}'.")
+    if path.is_dir():
+        raise InputError(f"Expected a file name to write, but '{path}' is a folder.")
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(f"Expected a folder that can be written, but '{path.parent}' cannot.")
+
+
+def _check_folder(path: Path) -> None:
+    if path.exists() and not path.is_dir():
+        raise InputError(f"Expected a folder, but '{path}' is a file.")
+    if not path.exists() and not path.parent.is_dir():
+        raise InputError(f"Expected an existing folder for '{path}', but there is no '{path.parent}'.")
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise InputError(f"Expected a folder that can be written, but '{path}' cannot.")
+
+
+@contextmanager
+def _progress(quiet: bool) -> Iterator[Progress]:
+    """Show a bar per stage on stderr, where somebody can see it."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress as Bars, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description:<10}"), BarColumn(), TimeElapsedColumn())
+    with Bars(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as bars:
+        tasks: dict[str, Any] = {}
+
+        def tell(stage: str, share: float) -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=1.0)
+            bars.update(tasks[stage], completed=share)
+
+        yield tell
+
+
+def _animate(maze: Maze, episode: Any, out: Path, progress: Progress) -> None:
+    from planners.drawing import animate
+
+    animate(maze, episode.joints, out, progress)

@@ -1,0 +1,146 @@
+"""Pictures of what planners see and do: path, beams, corners, poses, animations."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.animation import PillowWriter
+from matplotlib.collections import LineCollection
+
+from hrsnake_env.arm import FloatArray
+from hrsnake_env.errors import InputError
+from hrsnake_env.files import replacing
+from hrsnake_env.maze import Maze
+from hrsnake_env.rendering import MazePicture
+from planners.beam_planner import Geometry, survey
+from planners.problem import Motion, Progress
+
+__all__ = ["animate", "draw_geometry", "draw_poses"]
+
+GREEN, RED = "#1a9850", "#d73027"
+"""The paper's colours of the left and the right beams."""
+
+POSE_COLOURS = ("#fdbb84", "#fc8d59", "#e34a33", "#b30000", "#7f0000")
+"""From the first pose shown to the last."""
+
+FRAMES, FRAMES_PER_SECOND = 90, 15
+
+
+def draw_geometry(
+    maze: Maze, motion: Motion | None, out: Path, link_radius: float = 0.0
+) -> dict[str, Any]:
+    """Draw path, beams and critical corners of a maze, and poses of a motion if one is given.
+
+    Parameters
+    ----------
+    maze : Maze
+        The maze.
+    motion : Motion or None
+        In that maze.
+    out : Path
+        The picture; its ending says the format.
+    link_radius : float
+        Beams end at walls grown by this much, in maze units.
+
+    Returns
+    -------
+    summary : dict
+        Passage width, path length and corners.
+
+    Raises
+    ------
+    InputError
+        If no path leads to the goal.
+    """
+    geometry = survey(maze, link_radius)
+    if geometry is None:
+        raise InputError(
+            f"Expected a maze with a path for links of radius {link_radius:g}, but none leads from the base of "
+            f"'{maze.name}' to its goal."
+        )
+    picture = MazePicture(maze)
+    _draw_beams(picture, geometry)
+    if motion is not None:
+        _add_poses(picture, motion.joints)
+    picture.save(out)
+    return {
+        "passage_width": geometry.path.width,
+        "path_length": geometry.path.length,
+        "corners": [{"turn": corner.name, "place": corner.place} for corner in geometry.corners],
+    }
+
+
+def _draw_beams(picture: MazePicture, geometry: Geometry) -> None:
+    axes, path, beams = picture.axes, geometry.path, geometry.beams
+    for ends, colour in ((beams.left, GREEN), (beams.right, RED)):
+        lines = np.stack([path.points, ends], axis=1)
+        axes.add_collection(LineCollection(list(lines), colors=colour, linewidths=0.4, alpha=0.7))
+    axes.plot(*path.points.T, color="black", linewidth=1.4)
+    for corner in geometry.corners:
+        run = path.points[corner.first : corner.last + 1]
+        colour = GREEN if corner.turn > 0 else RED
+        axes.plot(*run.T, color=colour, linewidth=3.5, solid_capstyle="round")
+        axes.plot(*corner.place, marker="o", color="black", markersize=4)
+        middle = run[len(run) // 2]
+        label = f"{corner.name} corner"
+        axes.annotate(
+            label, middle, xytext=(0, 9), textcoords="offset points", ha="center", fontsize=8, weight="bold",
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
+        )  # fmt: skip
+
+
+def draw_poses(maze: Maze, joints: FloatArray, out: Path, title: str = "") -> None:
+    """Draw five poses of a run, evenly chosen from when the tip has left the base's neighbourhood.
+
+    Parameters
+    ----------
+    maze : Maze
+        The maze.
+    joints : array, shape (n_poses, n_links + 1, 2)
+        In maze units.
+    out : Path
+        The picture; its ending says the format.
+    title : str
+        Above the picture.
+    """
+    picture = MazePicture(maze)
+    _add_poses(picture, joints)
+    if title:
+        picture.axes.set_title(title, fontsize=10)
+    picture.save(out)
+
+
+def _add_poses(picture: MazePicture, joints: FloatArray) -> None:
+    n_shown = min(len(POSE_COLOURS), len(joints))
+    chosen = np.linspace(0, len(joints) - 1, n_shown + 1).round().astype(int)[1:]
+    for pose, colour in zip(chosen, POSE_COLOURS, strict=False):
+        picture.axes.plot(
+            *joints[pose].T, color=colour, linewidth=2.0, marker="o", markersize=3.5, solid_capstyle="round"
+        )
+
+
+def animate(maze: Maze, joints: FloatArray, out: Path, progress: Progress | None = None) -> None:
+    """Write an animation (GIF) of a run, completely or not at all.
+
+    Parameters
+    ----------
+    maze : Maze
+        The maze.
+    joints : array, shape (n_poses, n_links + 1, 2)
+        In maze units.
+    out : Path
+        The file.
+    progress : callable, optional
+        Called with "animate" and the share done.
+    """
+    picture = MazePicture(maze)
+    frames = np.unique(np.linspace(0, len(joints) - 1, FRAMES).round().astype(int))
+    writer = PillowWriter(fps=FRAMES_PER_SECOND)
+    with replacing(out) as part, writer.saving(picture.figure, part, dpi=picture.figure.dpi):
+        for number, frame in enumerate(frames):
+            picture.draw_arm(joints[frame])
+            writer.grab_frame()
+            if progress is not None:
+                progress("animate", (number + 1) / len(frames))

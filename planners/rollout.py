@@ -1,0 +1,162 @@
+"""Episodes: a policy in the environment, from reset to end, and what came of it."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+import hrsnake_env  # registers the environment
+from hrsnake_env.arm import ArmSpec, FloatArray
+from hrsnake_env.contacts import PinchReport
+from hrsnake_env.maze import Maze
+from hrsnake_env.physics import simulate
+from planners.controllers import PlannedPolicy
+from planners.problem import Motion, Progress
+
+__all__ = ["Episode", "Policy", "run_episode", "simulate_motion"]
+
+ENV_ID = f"{hrsnake_env.__name__}:HyperRedundantMaze-v0"
+
+
+class Policy(Protocol):
+    """Anything with `predict` as stable-baselines3 has it."""
+
+    def predict(
+        self,
+        observation: Any,
+        state: tuple[Any, ...] | None = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[Any], tuple[Any, ...] | None]:
+        """Return an action and the state for the next call."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Episode:
+    """Hold what happened from reset to end.
+
+    Parameters
+    ----------
+    joints : array, shape (n_steps + 1, n_links + 1, 2)
+        Joint positions at reset and after each step, base end first, in maze units.
+    rewards : array, shape (n_steps,)
+        As the environment gave them.
+    success : bool
+        Whether the tip came to the goal.
+    report : PinchReport
+        What touched what.
+    seconds : float
+        Wall time of the steps.
+    """
+
+    joints: FloatArray
+    rewards: FloatArray
+    success: bool
+    report: PinchReport
+    seconds: float
+
+    @property
+    def n_steps(self) -> int:
+        """Number of steps."""
+        return len(self.rewards)
+
+
+def run_episode(
+    env: gym.Env[Any, Any], policy: Policy, seed: int | None = None, progress: Progress | None = None
+) -> Episode:
+    """Run one episode of `HyperRedundantMaze-v0`.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        The environment, wrapped or not.
+    policy : Policy
+        A `PlannedPolicy`, or a model of stable-baselines3.
+    seed : int, optional
+        For `env.reset`.
+    progress : callable, optional
+        Called with "simulate" and the share of the time limit that is used up.
+
+    Returns
+    -------
+    episode : Episode
+        From reset until it was terminated or truncated.
+    """
+    world: Any = env.unwrapped
+    observation, info = env.reset(seed=seed)
+    limit = None if env.spec is None else env.spec.max_episode_steps
+    joints, rewards = [world.physics.joints.copy()], []
+    state, start, over = None, np.array([True]), False
+    began = time.perf_counter()
+    while not over:
+        action, state = policy.predict(observation, state=state, episode_start=start, deterministic=True)
+        observation, reward, terminated, truncated, info = env.step(action)
+        joints.append(world.physics.joints.copy())
+        rewards.append(float(reward))
+        start, over = np.array([False]), terminated or truncated
+        if progress is not None and limit and len(rewards) % 50 == 0:
+            progress("simulate", len(rewards) / limit)
+    return Episode(
+        joints=np.array(joints),
+        rewards=np.array(rewards),
+        success=bool(info["is_success"]),
+        report=world.physics.report(),
+        seconds=time.perf_counter() - began,
+    )
+
+
+def simulate_motion(
+    motion: Motion,
+    maze: Maze,
+    arm: ArmSpec | None = None,
+    *,
+    substeps: int = 4,
+    progress: Progress | None = None,
+) -> Episode:
+    """Drive the simulated arm along a motion, with dynamic links and again with kinematic ones.
+
+    Parameters
+    ----------
+    motion : Motion
+        From the base of this maze; it need not be valid there.
+    maze : Maze
+        The maze.
+    arm : ArmSpec, optional
+        Gives the link radius; by default 0.
+    substeps : int
+        Simulated steps per action.
+    progress : callable, optional
+        Called with stage and share done.
+
+    Returns
+    -------
+    episode : Episode
+        Of the dynamic links. Its report holds the kinematic pass, in which no wall pushes and distances are
+        exact.
+    """
+    motion.check_maze(maze)
+    spec = ArmSpec(link_length=motion.link_length) if arm is None else arm
+    spec = dataclasses.replace(spec, n_links=motion.n_links)
+    policy = PlannedPolicy(motion)
+    env = gym.make(
+        ENV_ID,
+        max_episode_steps=len(policy.actions) + 2,  # the arm is one substep behind its target
+        maze=maze,
+        link_length=spec.link_length,
+        n_links=spec.n_links,
+        link_radius=spec.link_radius,
+        substeps=substeps,
+        terminate_on_collision=False,
+    )
+    episode = run_episode(env, policy, progress=progress)
+    env.close()
+    exact = simulate(maze, spec, motion.feed, motion.joint_angles, substeps=substeps, kinematic=True)
+    if progress is not None:
+        progress("simulate", 1.0)
+    return dataclasses.replace(episode, report=dataclasses.replace(episode.report, kinematic=exact))

@@ -1,0 +1,183 @@
+"""What the command line prints: results as tables for people and as plain data for programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from hrsnake_env.arm import ArmSpec
+from hrsnake_env.contacts import PINCH_TOLERANCE, PinchReport
+from hrsnake_env.maze import Maze
+from planners.problem import Motion, PlanningResult, ValidationReport
+
+if TYPE_CHECKING:
+    from planners.demo import Demo
+    from planners.rollout import Episode
+
+__all__ = [
+    "show_demo",
+    "show_geometry",
+    "show_plan",
+    "show_rows",
+    "show_validation",
+    "show_verdict",
+    "validation_dict",
+    "verdict_rows",
+]
+
+Rows = Iterable[tuple[str, str]]
+
+
+def show_rows(title: str, rows: Rows) -> None:
+    """Print a table of names and figures."""
+    table = Table(title=title, title_justify="left", show_header=False, box=box.SIMPLE_HEAD)
+    table.add_column(style="bold")
+    table.add_column(overflow="fold")
+    for name, figure in rows:
+        table.add_row(name, figure)
+    Console().print(table)
+
+
+def seconds(value: float) -> str:
+    """Write a time in ms or s."""
+    return f"{value * 1e3:.3g} ms" if value < 1.0 else f"{value:.3g} s"
+
+
+def timing_rows(timings: dict[str, float], n_poses: int) -> Rows:
+    """Write the time of each stage, for the whole motion and per pose."""
+    for stage, value in timings.items():
+        yield f"time: {stage}", f"{seconds(value)}, {value / n_poses * 1e6:.3g} us per pose"
+
+
+def validation_rows(maze: Maze, motion: Motion, report: ValidationReport) -> Rows:
+    """Write the figures of the exact check."""
+    length, units = motion.link_length, maze.units
+    yield "exact check", "valid" if report.valid else "NOT VALID"
+    for fault in report.faults:
+        yield f"  {fault.kind}", fault.message
+    yield "clearance at poses", f"{report.clearance:.4g} {units} ({report.clearance / length:.2g} link lengths)"
+    yield "penetration at poses", f"{report.penetration:.4g} {units}"
+    yield (
+        "penetration between poses",
+        f"at most {report.penetration_between:.4g} {units} "
+        f"({report.penetration_between / length:.2g} link lengths; {PINCH_TOLERANCE:g} allowed)",
+    )
+    yield "largest joint step", f"{report.largest_step / length:.3f} link lengths"
+    yield "tip to goal", f"{report.goal_distance:.3g} {units} (radius {maze.goal_radius:g})"
+
+
+def validation_dict(report: ValidationReport) -> dict[str, Any]:
+    """Return the exact check as plain data; None stands for infinity."""
+    data = {key: value for key, value in vars(report).items() if key != "faults"}
+    data = {key: value if abs(value) != float("inf") else None for key, value in data.items()}
+    faults = [
+        {key: value if value != float("inf") else None for key, value in vars(fault).items()}
+        for fault in report.faults
+    ]
+    return {"valid": report.valid, **data, "faults": faults}
+
+
+def motion_rows(maze: Maze, motion: Motion) -> Rows:
+    """Write what a motion is."""
+    yield "maze", maze.name
+    yield "arm", f"{motion.n_links} links of {motion.link_length:g} {maze.units}"
+    yield "poses", f"{motion.n_poses}"
+
+
+def plan_rows(maze: Maze, arm: ArmSpec, result: PlanningResult) -> Rows:
+    """Write the outcome of planning."""
+    yield "status", f"{result.status} (planner: {result.planner})"
+    if result.motion is None:
+        yield "maze", maze.name
+        yield "link length", f"{arm.link_length:g} {maze.units}"
+        yield "reason", result.reason
+        if result.place is not None:
+            yield "place", f"({result.place[0]:.1f}, {result.place[1]:.1f}) {maze.units}"
+        return
+    assert result.report is not None  # a motion is there only if it was validated
+    yield from motion_rows(maze, result.motion)
+    yield from validation_rows(maze, result.motion, result.report)
+    yield from timing_rows(dict(result.timings), result.motion.n_poses)
+
+
+def show_plan(maze: Maze, arm: ArmSpec, result: PlanningResult, out: Path | None) -> None:
+    """Print the outcome of planning."""
+    show_rows("Plan", plan_rows(maze, arm, result))
+    if out is not None:
+        print(f"Written: {out}" if result.motion is not None else f"Nothing written to {out}: no motion.")
+
+
+def show_validation(maze: Maze, motion: Motion, report: ValidationReport) -> None:
+    """Print the exact check of a motion."""
+    show_rows("Exact check", [*motion_rows(maze, motion), *validation_rows(maze, motion, report)])
+
+
+def verdict_rows(maze: Maze, report: PinchReport) -> Rows:
+    """Write the verdict: what touched what."""
+    units, length = maze.units, report.link_length
+    yield "verdict", "clean: links merely pinch the walls" if report.clean else "NOT CLEAN"
+    for name, run in (("dynamic links", report), ("kinematic links", report.kinematic)):
+        if run is None:
+            continue
+        yield f"{name}: free", f"{run.free} link-poses"
+        yield f"{name}: pinch", f"{run.pinch} link-poses"
+        yield f"{name}: collision", f"{run.collision} link-poses"
+        yield f"{name}: worst depth", f"{run.worst_depth:.4g} {units} ({run.worst_depth / length:.2g} link lengths)"
+        for touch in run.collisions:
+            where = f"wall {touch.wall}" if touch.corner is None else f"corner {_place(touch.corner)}"
+            yield "  collided", f"{where}, {-touch.clearance:.4g} {units} deep"
+        if run.first_collision is not None:
+            first = run.first_collision
+            yield "  first", f"pose {first.pose}, link {first.link}, at {_place(first.point)}, {-first.clearance:.4g} {units} deep"
+    yield "largest wall impulse", f"{report.largest_impulse:.4g} link masses x link lengths / s"
+    yield "node error", f"{report.node_error:.4g} {units}"
+    yield "joint drift", f"{report.drift:.4g} {units}"
+    yield "links that pinched", ", ".join(map(str, report.pinched_links)) or "none"
+    yield "corners pinched", ", ".join(_place(touch.corner) for touch in report.pinched_corners if touch.corner) or "none"
+
+
+def _place(place: tuple[float, float]) -> str:
+    return f"({place[0]:.5g}, {place[1]:.5g})"
+
+
+def show_verdict(maze: Maze, episode: Episode, out: Path | None) -> None:
+    """Print what the simulation found."""
+    goal = "reached" if episode.success else "NOT REACHED"
+    rows = [
+        ("maze", maze.name),
+        ("goal", goal),
+        ("steps", f"{episode.n_steps}, {seconds(episode.seconds / episode.n_steps)} each"),
+    ]
+    show_rows("Simulation", [*rows, *verdict_rows(maze, episode.report)])
+    if out is not None:
+        print(f"Written: {out}")
+
+
+def show_geometry(maze: Maze, summary: dict[str, Any], out: Path) -> None:
+    """Print the geometry of section 2 of the paper."""
+    rows = [("maze", maze.name), ("narrowest passage", f"{summary['passage_width']:.4g} {maze.units}")]
+    rows.append(("path length", f"{summary['path_length']:.5g} {maze.units}"))
+    for corner in summary["corners"]:
+        rows.append((f"{corner['turn']} corner", _place(corner["place"])))
+    show_rows("Geometry", rows)
+    print(f"Written: {out}")
+
+
+def show_demo(demo: Demo) -> None:
+    """Print what the demonstration found."""
+    show_rows("Plan", plan_rows(demo.maze, demo.arm, demo.result))
+    if demo.episode is None:
+        return
+    rows = [
+        ("index I (Eq. 4)", f"{demo.index:.3f}: {demo.arm.link_length:g} of at most 440 {demo.maze.units}"),
+        ("goal", "reached" if demo.episode.success else "NOT REACHED"),
+        ("time: simulate", f"{seconds(demo.episode.seconds)}, {seconds(demo.episode.seconds / demo.episode.n_steps)} per step"),
+    ]
+    show_rows("Simulation", [*rows, *verdict_rows(demo.maze, demo.episode.report)])
+    for path in demo.files:
+        print(f"Written: {path}")
