@@ -243,4 +243,4 @@ def _progress(quiet: bool) -> Iterator[Progress]:
 def _animate(maze: Maze, episode: Any, out: Path, progress: Progress) -> None:
     from planners.drawing import animate
 
-    animate(maze, episode.joints, out, progress)
+    animate(maze, episode, out, progress)

@@ -95,10 +95,9 @@ def run_demo(folder: Path, progress: Progress | None = None) -> Demo:
     folder.mkdir(exist_ok=True)
     names = ("five_poses.png", "geometry.png", "animation.gif", "motion.npz", "verdict.json")
     poses, geometry, animation, motion, verdict = files = tuple(folder / name for name in names)
-    title = f"Simulated: {result.motion.n_links} links of {arm.link_length:g} {maze.units}"
-    draw_poses(maze, episode.joints, poses, title)
+    draw_poses(maze, episode, poses)
     draw_geometry(maze, None, geometry)
-    animate(maze, episode.joints, animation, progress)
+    animate(maze, episode, animation, progress)
     result.motion.save(motion)
     demo = Demo(maze=maze, arm=arm, result=result, episode=episode, files=files)
     with replacing(verdict) as part:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from matplotlib.animation import PillowWriter
 from matplotlib.collections import LineCollection
+from matplotlib.image import imsave
 
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.errors import InputError
@@ -22,10 +24,22 @@ __all__ = ["animate", "draw_geometry", "draw_poses"]
 GREEN, RED = "#1a9850", "#d73027"
 """The paper's colours of the left and the right beams."""
 
-POSE_COLOURS = ("#fdbb84", "#fc8d59", "#e34a33", "#b30000", "#7f0000")
-"""From the first pose shown to the last."""
+N_PANELS = 5
+N_FRAMES, FRAMES_PER_SECOND = 90, 15
 
-FRAMES, FRAMES_PER_SECOND = 90, 15
+
+class Run(Protocol):
+    """A run whose poses can be drawn."""
+
+    @property
+    def joints(self) -> FloatArray:
+        """Joint positions, shape (n_poses, n_links + 1, 2)."""
+
+    def pinched(self, pose: int) -> Collection[int]:
+        """Return the links that pinch a wall in a pose."""
+
+    def collided(self, pose: int) -> Collection[int]:
+        """Return the links that collide in a pose."""
 
 
 def draw_geometry(
@@ -63,7 +77,8 @@ def draw_geometry(
     picture = MazePicture(maze)
     _draw_beams(picture, geometry)
     if motion is not None:
-        _add_poses(picture, motion.joints)
+        for pose in np.linspace(0, motion.n_poses - 1, N_PANELS).round().astype(int):
+            picture.add_arm(motion.joints[pose], alpha=0.2 + 0.8 * pose / max(motion.n_poses - 1, 1))
     picture.save(out)
     return {
         "passage_width": geometry.path.width,
@@ -84,63 +99,61 @@ def _draw_beams(picture: MazePicture, geometry: Geometry) -> None:
         axes.plot(*run.T, color=colour, linewidth=3.5, solid_capstyle="round")
         axes.plot(*corner.place, marker="o", color="black", markersize=4)
         middle = run[len(run) // 2]
-        label = f"{corner.name} corner"
+        outward = middle - corner.place
         axes.annotate(
-            label, middle, xytext=(0, 9), textcoords="offset points", ha="center", fontsize=8, weight="bold",
+            f"{corner.name} corner",
+            middle,
+            xytext=16.0 * outward / np.hypot(*outward),
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            fontsize=8,
+            weight="bold",
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
-        )  # fmt: skip
+        )
 
 
-def draw_poses(maze: Maze, joints: FloatArray, out: Path, title: str = "") -> None:
-    """Draw five poses of a run, evenly chosen from when the tip has left the base's neighbourhood.
+def draw_poses(maze: Maze, run: Run, out: Path) -> None:
+    """Draw five poses of a run side by side, evenly chosen, the last among them.
 
     Parameters
     ----------
     maze : Maze
         The maze.
-    joints : array, shape (n_poses, n_links + 1, 2)
-        In maze units.
+    run : Run
+        What came of a motion in the simulator.
     out : Path
-        The picture; its ending says the format.
-    title : str
-        Above the picture.
+        The picture (.png).
     """
     picture = MazePicture(maze)
-    _add_poses(picture, joints)
-    if title:
-        picture.axes.set_title(title, fontsize=10)
-    picture.save(out)
+    panels = []
+    for pose in np.linspace(0, len(run.joints) - 1, N_PANELS + 1).round().astype(int)[1:]:
+        picture.draw_arm(run.joints[pose], pinched=run.pinched(pose), collided=run.collided(pose))
+        panels.append(picture.rgb())
+    with replacing(out) as part:
+        imsave(part, np.concatenate(panels, axis=1))
 
 
-def _add_poses(picture: MazePicture, joints: FloatArray) -> None:
-    n_shown = min(len(POSE_COLOURS), len(joints))
-    chosen = np.linspace(0, len(joints) - 1, n_shown + 1).round().astype(int)[1:]
-    for pose, colour in zip(chosen, POSE_COLOURS, strict=False):
-        picture.axes.plot(
-            *joints[pose].T, color=colour, linewidth=2.0, marker="o", markersize=3.5, solid_capstyle="round"
-        )
-
-
-def animate(maze: Maze, joints: FloatArray, out: Path, progress: Progress | None = None) -> None:
+def animate(maze: Maze, run: Run, out: Path, progress: Progress | None = None) -> None:
     """Write an animation (GIF) of a run, completely or not at all.
 
     Parameters
     ----------
     maze : Maze
         The maze.
-    joints : array, shape (n_poses, n_links + 1, 2)
-        In maze units.
+    run : Run
+        What came of a motion in the simulator.
     out : Path
         The file.
     progress : callable, optional
         Called with "animate" and the share done.
     """
     picture = MazePicture(maze)
-    frames = np.unique(np.linspace(0, len(joints) - 1, FRAMES).round().astype(int))
+    frames = np.unique(np.linspace(0, len(run.joints) - 1, N_FRAMES).round().astype(int))
     writer = PillowWriter(fps=FRAMES_PER_SECOND)
     with replacing(out) as part, writer.saving(picture.figure, part, dpi=picture.figure.dpi):
         for number, frame in enumerate(frames):
-            picture.draw_arm(joints[frame])
-            writer.grab_frame()
+            picture.draw_arm(run.joints[frame], pinched=run.pinched(frame), collided=run.collided(frame))
+            writer.grab_frame(facecolor=picture.figure.get_facecolor())
             if progress is not None:
                 progress("animate", (number + 1) / len(frames))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import hrsnake_env  # registers the environment
 from hrsnake_env.arm import ArmSpec, FloatArray
-from hrsnake_env.contacts import PinchReport
+from hrsnake_env.contacts import Contact, PinchReport
 from hrsnake_env.maze import Maze
 from hrsnake_env.physics import simulate
 from planners.controllers import PlannedPolicy
@@ -47,6 +47,8 @@ class Episode:
         Joint positions at reset and after each step, base end first, in maze units.
     rewards : array, shape (n_steps,)
         As the environment gave them.
+    contacts : tuple, one entry per pose
+        The contacts of each pose.
     success : bool
         Whether the tip came to the goal.
     report : PinchReport
@@ -57,6 +59,7 @@ class Episode:
 
     joints: FloatArray
     rewards: FloatArray
+    contacts: tuple[tuple[Contact, ...], ...]
     success: bool
     report: PinchReport
     seconds: float
@@ -65,6 +68,17 @@ class Episode:
     def n_steps(self) -> int:
         """Number of steps."""
         return len(self.rewards)
+
+    def pinched(self, pose: int) -> frozenset[int]:
+        """Return the links that pinch something in a pose."""
+        return self._touching(pose, "pinch")
+
+    def collided(self, pose: int) -> frozenset[int]:
+        """Return the links that collide with something in a pose."""
+        return self._touching(pose, "collision")
+
+    def _touching(self, pose: int, kind: str) -> frozenset[int]:
+        return frozenset(contact.link for contact in self.contacts[pose] if contact.kind == kind)
 
 
 def run_episode(
@@ -91,13 +105,14 @@ def run_episode(
     world: Any = env.unwrapped
     observation, info = env.reset(seed=seed)
     limit = None if env.spec is None else env.spec.max_episode_steps
-    joints, rewards = [world.physics.joints.copy()], []
+    joints, contacts, rewards = [world.physics.joints.copy()], [world.physics.pose_contacts], []
     state, start, over = None, np.array([True]), False
     began = time.perf_counter()
     while not over:
         action, state = policy.predict(observation, state=state, episode_start=start, deterministic=True)
         observation, reward, terminated, truncated, info = env.step(action)
         joints.append(world.physics.joints.copy())
+        contacts.append(world.physics.pose_contacts)
         rewards.append(float(reward))
         start, over = np.array([False]), terminated or truncated
         if progress is not None and limit and len(rewards) % 50 == 0:
@@ -105,6 +120,7 @@ def run_episode(
     return Episode(
         joints=np.array(joints),
         rewards=np.array(rewards),
+        contacts=tuple(contacts),
         success=bool(info["is_success"]),
         report=world.physics.report(),
         seconds=time.perf_counter() - began,
