@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,10 +21,13 @@ from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
 
-__all__ = ["Maze"]
+__all__ = ["MAZES", "Maze"]
 
 MITRE_LIMIT = 10.0
 """Corridor corners sharper than about 11 degrees are cut off; all others are square."""
+
+MAZES: dict[str, Callable[[], Maze]] = {}
+"""The builders of the named mazes, in the order in which they are listed; `hrsnake_env.mazes` fills it."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -146,7 +149,7 @@ class Maze:
         Parameters
         ----------
         source : str or path
-            One of `hrsnake_env.mazes.MAZES`, or the path of a `.geojson` or `.json` file.
+            One of `MAZES`, or the path of a `.geojson` or `.json` file.
 
         Raises
         ------
@@ -158,8 +161,6 @@ class Maze:
         >>> Maze.load("fig19").goal
         array([240., 700.])
         """
-        from hrsnake_env.mazes import MAZES  # the named mazes are built from this class
-
         text = os.fspath(source)
         if text in MAZES:
             return MAZES[text]()
@@ -297,7 +298,9 @@ def _checked_parts(free_space: Any) -> list[Polygon]:
     if free_space.is_empty:
         raise InputError("Expected a free space with an area, got an empty polygon.")
     if not free_space.is_valid:
-        raise InputError(f"Expected a valid polygon as free space, got one with: {explain_validity(free_space)}.")
+        raise InputError(
+            f"Expected a valid polygon as free space, got one with: {explain_validity(free_space)}."
+        )
     return list(free_space.geoms) if isinstance(free_space, MultiPolygon) else [free_space]
 
 
@@ -315,7 +318,12 @@ def _front_clearance(ray: LineString, walls: Any) -> float:
     along, reach = _unit(end - start), float(np.linalg.norm(end - start))
     across = np.array([-along[1], along[0]])
     front = Polygon(
-        [start + reach * across, end + reach * (across + along), end - reach * (across - along), start - reach * across]
+        [
+            start + reach * across,
+            end + reach * (across + along),
+            end - reach * (across - along),
+            start - reach * across,
+        ]
     )
     return float(ray.distance(walls.intersection(front)))
 
@@ -357,9 +365,13 @@ def _geometry(feature: dict[str, Any], role: str, kinds: tuple[str, ...]) -> Any
     try:
         geometry = shape(data)
     except (TypeError, ValueError, KeyError, IndexError, AttributeError, shapely.errors.ShapelyError):
-        raise InputError(f"Expected {kind} coordinates in the '{role}' feature, got none that can be read.") from None
+        raise InputError(
+            f"Expected {kind} coordinates in the '{role}' feature, got none that can be read."
+        ) from None
     if geometry.is_empty or not np.isfinite(shapely.get_coordinates(geometry)).all():
-        raise InputError(f"Expected finite {kind} coordinates in the '{role}' feature, got an empty or infinite one.")
+        raise InputError(
+            f"Expected finite {kind} coordinates in the '{role}' feature, got an empty or infinite one."
+        )
     return shapely.force_2d(geometry)
 
 

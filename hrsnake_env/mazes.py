@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 from shapely.geometry import Polygon
 
 from hrsnake_env.errors import InputError
-from hrsnake_env.maze import Maze
+from hrsnake_env.maze import MAZES, Maze
 
 __all__ = ["MAZES", "corridor_family", "fig19"]
 
@@ -65,7 +64,16 @@ def fig19(l1: float = 200.0, l2: float = 200.0, wall: float = 40.0, end_gap: flo
         raise InputError(f"Expected an end_gap under {2 * leg:g}, so that a wall is left, got {end_gap:g}.")
     left, inner, outer = -l1 / 2, l1 / 2, l1 / 2 + wall
     right, top, tip = outer + l2, leg + end_gap / 2, leg - end_gap / 2
-    corners = [(left, 0), (inner, 0), (inner, tip), (outer, tip), (outer, 0), (right, 0), (right, top), (left, top)]
+    corners = [
+        (left, 0),
+        (inner, 0),
+        (inner, tip),
+        (outer, tip),
+        (outer, 0),
+        (right, 0),
+        (right, top),
+        (left, top),
+    ]
     return Maze(
         name="fig19",
         free_space=Polygon(corners),
@@ -98,8 +106,5 @@ def corridor_family(name: str, width: float = 200.0) -> Maze:
     return Maze.from_corridors(np.array(waypoints), width, name=name)
 
 
-MAZES: dict[str, Callable[[], Maze]] = {
-    "fig19": fig19,
-    **{name: partial(corridor_family, name) for name in LEGS},
-}
-"""The builders of the named mazes, in the order in which they are listed."""
+MAZES["fig19"] = fig19
+MAZES.update({name: partial(corridor_family, name) for name in LEGS})

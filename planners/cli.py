@@ -14,7 +14,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
-import click
 import typer
 
 from hrsnake_env.arm import ArmSpec
@@ -33,10 +32,13 @@ INTERRUPTED = 130
 
 app = typer.Typer(
     name="hrsnake",
-    help="Plan and simulate hyper-redundant arms in spaces so tight that the links pinch the walls.",
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+)
+
+# Some versions of typer carry their own copy of click: its base of all usage errors is found by name.
+UsageError: type[Exception] = next(
+    cls for cls in typer.BadParameter.__mro__ if cls.__name__ == "ClickException"
 )
 
 MazeArgument = Annotated[str, typer.Argument(metavar="MAZE", help="A named maze, or a .geojson file.")]
@@ -44,6 +46,13 @@ MotionArgument = Annotated[Path, typer.Argument(metavar="MOTION", help="A motion
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")]
 RadiusOption = Annotated[float, typer.Option("--link-radius", help="Radius of the links, in maze units.")]
 LimitOption = Annotated[float | None, typer.Option("--joint-limit", help="Largest joint angle, in degrees.")]
+
+
+@app.callback(invoke_without_command=True)
+def help_command(context: typer.Context) -> None:
+    """Plan and simulate hyper-redundant arms in spaces so tight that the links pinch the walls."""
+    if context.invoked_subcommand is None:
+        print(context.get_help())
 
 
 @app.command("plan")
@@ -66,7 +75,11 @@ def plan_command(
         result.motion.save(out)
     _print(
         as_json,
-        {**result.to_dict(), "validation": _report_dict(result), "out": _name(out, result.motion is not None)},
+        {
+            **result.to_dict(),
+            "validation": _report_dict(result),
+            "out": _name(out, result.motion is not None),
+        },
         lambda: tables.show_plan(world, arm, result, out),
     )
     if not result.solved:
@@ -142,7 +155,9 @@ def draw_command(
 
 @app.command("demo")
 def demo_command(
-    out: Annotated[Path, typer.Option("--out", help="Folder for the results; made if missing.")] = Path("demo"),
+    out: Annotated[Path, typer.Option("--out", help="Folder for the results; made if missing.")] = Path(
+        "demo"
+    ),
     as_json: JsonOption = False,
 ) -> None:
     """Plan, check and simulate the paper's benchmark (Fig. 19) with its links of 430 px."""
@@ -162,15 +177,15 @@ def main() -> None:
         code = app(standalone_mode=False)
     except InputError as error:
         sys.exit(_complain(str(error)))
-    except click.exceptions.NoArgsIsHelpError as error:
-        print(error.ctx.get_help() if error.ctx else "")
-        sys.exit(BAD_INPUT)
-    except click.ClickException as error:
-        sys.exit(_complain(error.format_message()))
-    except (KeyboardInterrupt, click.Abort):
+    except UsageError as error:
+        sys.exit(_complain(error.format_message()))  # type: ignore[attr-defined]
+    except OSError as error:
+        sys.exit(_complain(f"Expected files that can be read and written, got: {error}."))
+    except (KeyboardInterrupt, typer.Abort):
+        code = INTERRUPTED
+    if code == INTERRUPTED:  # typer turns Ctrl-C into this code
         print("hrsnake: stopped; no half-written file is left.", file=sys.stderr)
-        sys.exit(INTERRUPTED)
-    sys.exit(code if isinstance(code, int) else 0)
+    sys.exit(code or 0)
 
 
 def _complain(message: str) -> int:

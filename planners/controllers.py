@@ -57,9 +57,7 @@ class PlannedPolicy:
         What an action of 1 means in the environment; see `actions_of`.
     """
 
-    def __init__(
-        self, motion: Motion, feed_step: float = FEED_STEP, joint_step: float = JOINT_STEP
-    ) -> None:
+    def __init__(self, motion: Motion, feed_step: float = FEED_STEP, joint_step: float = JOINT_STEP) -> None:
         self.actions = actions_of(motion, feed_step, joint_step)
         self.reset()
 

@@ -42,9 +42,7 @@ class Run(Protocol):
         """Return the links that collide in a pose."""
 
 
-def draw_geometry(
-    maze: Maze, motion: Motion | None, out: Path, link_radius: float = 0.0
-) -> dict[str, Any]:
+def draw_geometry(maze: Maze, motion: Motion | None, out: Path, link_radius: float = 0.0) -> dict[str, Any]:
     """Draw path, beams and critical corners of a maze, and poses of a motion if one is given.
 
     Parameters

@@ -74,7 +74,9 @@ class Motion:
                 raise InputError(f"Expected {key} with shape {shape}, got {getattr(self, key).shape}.")
         if not (np.isfinite(self.link_length) and self.link_length > 0.0):
             raise InputError(f"Expected a positive, finite link_length, got {self.link_length!r}.")
-        if not all(np.isfinite(getattr(self, key)).all() for key in ("joints", "joint_angles", "feed", "base_pose")):
+        if not all(
+            np.isfinite(getattr(self, key)).all() for key in ("joints", "joint_angles", "feed", "base_pose")
+        ):
             raise InputError("Expected a motion of finite numbers, got NaN or infinity.")
 
     def __repr__(self) -> str:
@@ -122,7 +124,14 @@ class Motion:
         The keys are `joints`, `joint_angles`, `feed`, `link_length` and `base_pose`.
         """
         with replacing(path) as part, part.open("wb") as file:
-            np.savez_compressed(file, **{key: np.asarray(getattr(self, key)) for key in KEYS})
+            np.savez_compressed(
+                file,
+                joints=self.joints,
+                joint_angles=self.joint_angles,
+                feed=self.feed,
+                link_length=np.asarray(self.link_length),
+                base_pose=self.base_pose,
+            )
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Motion:
@@ -153,7 +162,8 @@ class Motion:
             raise InputError(f"Expected a motion (.npz) in '{path}', got a file that is not one.") from None
         if any(values[key].dtype.kind not in "fiu" for key in KEYS) or values["link_length"].size != 1:
             raise InputError(f"Expected a motion of numbers in '{path}', with one link_length.")
-        return cls(**{**values, "link_length": float(values["link_length"].item())})
+        link_length = float(values.pop("link_length").item())
+        return cls(link_length=link_length, **values)
 
     def check_maze(self, maze: Maze) -> None:
         """Check that the motion starts from the base of this maze.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -60,7 +60,10 @@ def validation_rows(maze: Maze, motion: Motion, report: ValidationReport) -> Row
     yield "exact check", "valid" if report.valid else "NOT VALID"
     for fault in report.faults:
         yield f"  {fault.kind}", fault.message
-    yield "clearance at poses", f"{report.clearance:.4g} {units} ({report.clearance / length:.2g} link lengths)"
+    yield (
+        "clearance at poses",
+        f"{report.clearance:.4g} {units} ({report.clearance / length:.2g} link lengths)",
+    )
     yield "penetration at poses", f"{report.penetration:.4g} {units}"
     yield (
         "penetration between poses",
@@ -127,21 +130,35 @@ def verdict_rows(maze: Maze, report: PinchReport) -> Rows:
         yield f"{name}: free", f"{run.free} link-poses"
         yield f"{name}: pinch", f"{run.pinch} link-poses"
         yield f"{name}: collision", f"{run.collision} link-poses"
-        yield f"{name}: worst depth", f"{run.worst_depth:.4g} {units} ({run.worst_depth / length:.2g} link lengths)"
+        yield (
+            f"{name}: worst depth",
+            f"{run.worst_depth:.4g} {units} ({run.worst_depth / length:.2g} link lengths)",
+        )
         for touch in run.collisions:
-            where = f"wall {touch.wall}" if touch.corner is None else f"corner {_place(touch.corner)}"
+            where = _wall(maze, touch.wall) if touch.corner is None else f"corner {_place(touch.corner)}"
             yield "  collided", f"{where}, {-touch.clearance:.4g} {units} deep"
         if run.first_collision is not None:
             first = run.first_collision
-            yield "  first", f"pose {first.pose}, link {first.link}, at {_place(first.point)}, {-first.clearance:.4g} {units} deep"
+            yield (
+                "  first",
+                f"pose {first.pose}, link {first.link}, at {_place(first.point)}, {-first.clearance:.4g} {units} deep",
+            )
     yield "largest wall impulse", f"{report.largest_impulse:.4g} link masses x link lengths / s"
     yield "node error", f"{report.node_error:.4g} {units}"
     yield "joint drift", f"{report.drift:.4g} {units}"
     yield "links that pinched", ", ".join(map(str, report.pinched_links)) or "none"
-    yield "corners pinched", ", ".join(_place(touch.corner) for touch in report.pinched_corners if touch.corner) or "none"
+    yield (
+        "corners pinched",
+        ", ".join(_place(touch.corner) for touch in report.pinched_corners if touch.corner) or "none",
+    )
 
 
-def _place(place: tuple[float, float]) -> str:
+def _wall(maze: Maze, number: int) -> str:
+    start, end = maze.walls[number].tolist()
+    return f"wall {number} from {_place(start)} to {_place(end)}"
+
+
+def _place(place: Sequence[float]) -> str:
     return f"({place[0]:.5g}, {place[1]:.5g})"
 
 
@@ -176,7 +193,10 @@ def show_demo(demo: Demo) -> None:
     rows = [
         ("index I (Eq. 4)", f"{demo.index:.3f}: {demo.arm.link_length:g} of at most 440 {demo.maze.units}"),
         ("goal", "reached" if demo.episode.success else "NOT REACHED"),
-        ("time: simulate", f"{seconds(demo.episode.seconds)}, {seconds(demo.episode.seconds / demo.episode.n_steps)} per step"),
+        (
+            "time: simulate",
+            f"{seconds(demo.episode.seconds)}, {seconds(demo.episode.seconds / demo.episode.n_steps)} per step",
+        ),
     ]
     show_rows("Simulation", [*rows, *verdict_rows(demo.maze, demo.episode.report)])
     for path in demo.files:

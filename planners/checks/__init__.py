@@ -1,0 +1,1 @@
+"""The parts of the exact checker, `planners.validation`; none of them knows a planner."""

@@ -1,0 +1,244 @@
+"""The command line as a user meets it: outcomes, exit codes, and one sentence for bad input."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hrsnake_env.arm import ArmSpec
+from hrsnake_env.maze import Maze
+from hrsnake_env.mazes import fig19
+from planners import Motion, plan
+from planners.cli import main
+
+
+@pytest.fixture(autouse=True)
+def in_an_empty_folder(tmp_path, monkeypatch):
+    """Run every test in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def motion():
+    """Return the motion of the paper's links through the paper's benchmark."""
+    return plan(fig19(), ArmSpec(link_length=430.0)).motion
+
+
+@pytest.fixture
+def run(capsys, monkeypatch):
+    """Return a function that runs a command and returns exit code, stdout and stderr."""
+
+    def run_command(*arguments):
+        monkeypatch.setattr(sys, "argv", ["hrsnake", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        output = capsys.readouterr()
+        return ended.value.code or 0, output.out, output.err
+
+    return run_command
+
+
+def test_plan_writes_a_motion_that_validates_and_simulates(run):
+    code, out, err = run("plan", "fig19", "--link-length", 430, "--out", "m.npz")
+    assert (code, err) == (0, "")
+    assert "solved" in out and "7 links of 430 px" in out and "Written: m.npz" in out
+    code, out, _ = run("validate", "fig19", "m.npz")
+    assert code == 0 and "valid" in out
+    code, out, _ = run("simulate", "fig19", "m.npz")
+    assert code == 0 and "clean: links merely pinch the walls" in out
+
+
+def test_json_is_one_object_on_one_line(run, motion):
+    motion.save("m.npz")
+    code, out, _ = run("plan", "fig19", "--link-length", 430, "--json")
+    assert code == 0 and len(out.splitlines()) == 1
+    data = json.loads(out)
+    assert data["status"] == "solved" and data["n_links"] == 7 and data["validation"]["penetration"] == 0.0
+    code, out, _ = run("validate", "fig19", "m.npz", "--json")
+    assert json.loads(out)["valid"] is True
+    code, out, _ = run("simulate", "fig19", "m.npz", "--json")
+    verdict = json.loads(out)["verdict"]
+    assert verdict["clean"] is True and verdict["kinematic"]["collision"] == 0
+    code, out, _ = run("draw", "fig19", "--json")
+    assert json.loads(out)["corners"][0]["turn"] == "right"
+
+
+def test_no_plan_is_exit_code_3_with_a_reason_and_nothing_written(run):
+    code, out, err = run("plan", "fig19", "--link-length", 445, "--out", "m.npz")
+    assert (code, err) == (3, "")
+    assert "dead end" in out and "would have to jump" in out
+    assert not Path("m.npz").exists()
+    code, out, _ = run("plan", "fig19", "--link-length", 445, "--json")
+    data = json.loads(out)
+    assert code == 3 and data["status"] == "dead end" and len(data["place"]) == 2
+
+
+def test_a_motion_that_is_not_valid_is_exit_code_3(run, motion):
+    tighter = fig19(l1=196, l2=196, wall=44, end_gap=196)
+    tighter.save("tight.geojson")
+    motion.save("m.npz")
+    code, out, _ = run("validate", "tight.geojson", "m.npz")
+    assert code == 3 and "NOT VALID" in out and "penetration" in out
+    code, out, _ = run("simulate", "tight.geojson", "m.npz")
+    assert code == 3 and "NOT CLEAN" in out and "collided" in out
+    assert "wall 7 from (-98, 1598) to (-98, 0)" in " ".join(out.split())
+
+
+def test_draw_writes_a_picture(run, motion):
+    motion.save("m.npz")
+    code, out, _ = run("draw", "fig19", "m.npz", "--out", "p.svg")
+    assert code == 0 and "Written: p.svg" in out
+    assert Path("p.svg").read_text().startswith("<?xml")
+    code, _, _ = run("draw", "fig19")
+    assert code == 0 and Path("fig19.png").read_bytes().startswith(b"\x89PNG")
+    assert sorted(path.name for path in Path().iterdir()) == ["fig19.png", "m.npz", "p.svg"]
+
+
+def test_demo_shows_the_benchmark_and_says_where_its_files_are(run):
+    code, out, _ = run("demo")
+    assert code == 0
+    assert "clean: links merely pinch the walls" in out and "0.977" in out
+    names = ["animation.gif", "five_poses.png", "geometry.png", "motion.npz", "verdict.json"]
+    assert sorted(path.name for path in Path("demo").iterdir()) == names
+    assert all(f"Written: {Path('demo') / name}" in out for name in names)
+    assert Path("demo/animation.gif").read_bytes().startswith(b"GIF8")
+    verdict = json.loads(Path("demo/verdict.json").read_text())
+    assert verdict["success"] and verdict["verdict"]["clean"]
+    assert Motion.load("demo/motion.npz").link_length == 430.0
+
+
+def write_bad_files(motion):
+    """Write the files that the table below speaks of."""
+    motion.save("m.npz")
+    Path("text.npz").write_text("not a motion")
+    np.savez("other.npz", joints=np.zeros(3))
+    Motion.from_configurations([0.0, 1.0], np.zeros((2, 3)), 100.0, (9.0, 9.0, 0.0)).save("foreign.npz")
+    Path("broken.geojson").write_text("{")
+    Path("list.geojson").write_text("[1, 2]")
+    good = fig19().to_geojson()
+    for name, change in {
+        "base_out": lambda data: data["features"][1]["geometry"].update(coordinates=[-500, 5]),
+        "goal_in_wall": lambda data: data["features"][2]["geometry"].update(coordinates=[120, 700]),
+        "bow_tie": lambda data: data["features"][0]["geometry"].update(
+            coordinates=[[[0, 0], [9, 9], [9, 0], [0, 9], [0, 0]]]
+        ),
+        "empty": lambda data: data["features"][0]["geometry"].update(coordinates=[]),
+        "two_parts": lambda data: data["features"][0].update(
+            geometry={
+                "type": "MultiPolygon",
+                "coordinates": [
+                    [[[-100, 0], [100, 0], [100, 600], [-100, 600], [-100, 0]]],
+                    [[[140, 0], [340, 0], [340, 900], [140, 900], [140, 0]]],
+                ],
+            }
+        ),
+    }.items():
+        data = json.loads(json.dumps(good))
+        change(data)
+        Path(f"{name}.geojson").write_text(json.dumps(data))
+    Path("a_file").write_text("")
+
+
+BAD_INPUT = [
+    ("plan fig20 --link-length 430", "Unknown maze 'fig20'. Available: fig19, L, U40"),
+    ("plan none.geojson --link-length 430", "Expected a maze file at 'none.geojson', but there is none."),
+    ("plan broken.geojson --link-length 430", "Expected JSON in 'broken.geojson'"),
+    ("plan list.geojson --link-length 430", "Expected a GeoJSON FeatureCollection, got 'list'."),
+    ("plan bow_tie.geojson --link-length 430", "Expected a valid polygon as free space"),
+    ("plan empty.geojson --link-length 430", "Expected finite Polygon coordinates in the 'free' feature"),
+    ("plan base_out.geojson --link-length 430", "Expected the base inside the free space, got (-500, 5)"),
+    ("plan goal_in_wall.geojson --link-length 430", "Expected the goal inside the free space, got (120, 700)"),
+    ("plan two_parts.geojson --link-length 430", "Expected a free way from the base to the goal"),
+    ("plan fig19 --link-length 1596", "Expected one link length (1596 px) of straight free way"),
+    ("plan fig19 --link-length 0", "Expected a positive, finite link_length, got 0.0."),
+    ("plan fig19 --link-length -5", "Expected a positive, finite link_length, got -5.0."),
+    ("plan fig19 --link-length nan", "Expected a positive, finite link_length, got nan."),
+    ("plan fig19 --link-length 1e9", "Expected a link_length of at most the size of maze 'fig19'"),
+    ("plan fig19 --link-length 430 --link-radius -1", "Expected link_radius of at least 0"),
+    ("plan fig19 --link-length 430 --link-radius nan", "Expected link_radius of at least 0"),
+    ("plan fig19 --link-length 430 --joint-limit 0", "Expected joint_limit in (0, pi] rad"),
+    ("plan fig19 --link-length 430 --links 6", "Expected at least 7 links of 430 px to reach the goal"),
+    ("plan fig19 --link-length 430 --links 0", "Expected n_links to be a whole number of at least 1"),
+    ("plan fig19 --link-length 430 --planner best", "Unknown planner 'best'. Available: auto, beam"),
+    ("plan fig19 --link-length 430 --out no/m.npz", "Expected an existing folder for 'no/m.npz'"),
+    ("plan fig19 --link-length long", "Invalid value for '--link-length'"),
+    ("plan fig19", "Missing option '--link-length'"),
+    ("plan", "Missing argument 'MAZE'"),
+    ("fly fig19", "No such command 'fly'"),
+    ("plan fig19 --link-length 430 --fast", "No such option: --fast"),
+    ("validate fig19 none.npz", "Expected a motion file at 'none.npz', but there is none."),
+    ("validate fig19 text.npz", "Expected a motion (.npz) in 'text.npz', got a file that is not one."),
+    ("validate fig19 other.npz", "Expected a motion in 'other.npz' with the keys joints, joint_angles"),
+    ("validate fig19 foreign.npz", "Expected a motion from the base of maze 'fig19'"),
+    ("simulate fig19 foreign.npz", "Expected a motion from the base of maze 'fig19'"),
+    ("simulate fig19 m.npz --substeps 0", "Expected substeps to be a whole number of at least 1, got 0."),
+    ("simulate fig19 m.npz --out no/a.gif", "Expected an existing folder for 'no/a.gif'"),
+    ("draw fig19 foreign.npz", "Expected a motion from the base of maze 'fig19'"),
+    ("draw fig19 --out p.jpeg2", "Expected a file name ending in .png, .svg, .pdf, got 'p.jpeg2'."),
+    ("draw fig19 --link-radius 150", "Expected a maze with a path for links of radius 150"),
+    ("demo --out no/demo", "Expected an existing folder for 'no/demo'"),
+    ("demo --out a_file", "Expected a folder, but 'a_file' is a file."),
+]
+
+
+@pytest.mark.parametrize(("command", "sentence"), BAD_INPUT)
+def test_bad_input_gets_one_sentence_exit_code_2_and_writes_nothing(command, sentence, run, motion):
+    write_bad_files(motion)
+    before = {path: path.stat().st_mtime_ns for path in Path().rglob("*")}
+    code, out, err = run(*command.split())
+    assert code == 2
+    assert err.startswith("hrsnake: " + sentence)
+    assert err.count("\n") == 1 and "Traceback" not in err and out == ""
+    assert {path: path.stat().st_mtime_ns for path in Path().rglob("*")} == before
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_the_work(run, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda path, mode: False)  # permissions do not hold root back
+    code, _, err = run("plan", "fig19", "--link-length", 430, "--out", "m.npz")
+    assert code == 2 and err.startswith("hrsnake: Expected a folder that can be written")
+    code, _, err = run("demo")
+    assert code == 2 and err.startswith("hrsnake: Expected a folder that can be written")
+    assert list(Path().iterdir()) == []
+
+
+def test_a_full_disk_gets_one_sentence_too(run, monkeypatch):
+    def fail(*arguments, **settings):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(np, "savez_compressed", fail)
+    code, _, err = run("plan", "fig19", "--link-length", 430, "--out", "m.npz")
+    assert code == 2 and "No space left on device" in err and err.count("\n") == 1
+    assert list(Path().iterdir()) == []
+
+
+def test_ctrl_c_leaves_no_half_written_file(run, monkeypatch):
+    def interrupt(*arguments, **settings):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(np, "savez_compressed", interrupt)
+    code, _, err = run("plan", "fig19", "--link-length", 430, "--out", "m.npz")
+    assert code == 130 and err == "hrsnake: stopped; no half-written file is left.\n"
+    assert list(Path().iterdir()) == []
+
+
+def test_the_installed_command_answers(tmp_path):
+    command = Path(sys.executable).with_name("hrsnake")
+    if not command.exists():
+        pytest.skip("the package is not installed here")
+    done = subprocess.run([command, "--help"], capture_output=True, text=True)
+    assert done.returncode == 0
+    assert all(name in done.stdout for name in ("plan", "validate", "simulate", "draw", "demo"))
+    done = subprocess.run([command, "plan", "nowhere", "--link-length", "1"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (2, "")
+
+
+def test_a_maze_file_is_planned_like_a_named_maze(run):
+    Maze.load("U200").save("mine.geojson")
+    code, out, _ = run("plan", "mine.geojson", "--link-length", 300, "--json")
+    named = run("plan", "U200", "--link-length", 300, "--json")
+    assert code == named[0] == 0
+    assert json.loads(out)["n_poses"] == json.loads(named[1])["n_poses"]
