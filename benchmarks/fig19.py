@@ -1,7 +1,7 @@
 """The paper's benchmark, measured: time of each stage, verdicts among moved walls, and repeatability.
 
-Run with `.venv/bin/python benchmarks/fig19.py` from the repository's root. Prints the tables of the README and
-writes them with all figures to `benchmarks/results/fig19.json`.
+Run with `.venv/bin/python benchmarks/fig19.py` from the repository's root. Prints the tables of the README
+and writes them with all figures to `benchmarks/results/fig19.json`.
 """
 
 from __future__ import annotations
@@ -116,13 +116,18 @@ def print_tables(results: dict[str, Any]) -> None:
     print(f"\n| stage | whole motion of {n_poses} poses | per pose |\n|---|---|---|")
     for stage, value in results["stages_s"].items():
         print(f"| {stage} | {value * 1e3:.1f} ms | {value / n_poses * 1e6:.2f} us |")
-    planning = sum(value for stage, value in results["stages_s"].items() if stage not in ("validate", "simulate"))
+    planning = sum(
+        value for stage, value in results["stages_s"].items() if stage not in ("validate", "simulate")
+    )
     print(
         f"| maze to poses, the paper: {PAPER_MS_PER_POSE} ms per pose | {planning * 1e3:.1f} ms "
         f"| {planning / n_poses * 1e6:.2f} us |"
     )
     for title, rows in results["verdicts"].items():
-        print(f"\n{title}\n\n| walls moved inward | verdict | free, pinch, collision | depth (kinematic) | where, and how deep in px |")
+        print(
+            f"\n{title}\n\n| walls moved inward | verdict | free, pinch, collision | depth (kinematic) "
+            "| where, and how deep in px |"
+        )
         print("|---|---|---|---|---|")
         for row in rows:
             counts = f"{row['free']}, {row['pinch']}, {row['collision']}"
@@ -130,11 +135,13 @@ def print_tables(results: dict[str, Any]) -> None:
             places = {**{f"wall {number}": depth for number, depth in row["walls"].items()}, **row["corners"]}
             where = "; ".join(f"{place}: {depth:.2f}" for place, depth in places.items()) or "-"
             print(
-                f"| {row['walls_inward_px']:g} px | {verdict} | {counts} | {row['kinematic_depth_px']:.2f} px "
-                f"| {where} |"
+                f"| {row['walls_inward_px']:g} px | {verdict} | {counts} "
+                f"| {row['kinematic_depth_px']:.2f} px | {where} |"
             )
     same = len(set(results["fingerprints"])) == 1
-    print(f"\n{len(results['fingerprints'])} runs in 3 processes: {'bit-identical' if same else 'NOT THE SAME'}")
+    print(
+        f"\n{len(results['fingerprints'])} runs in 3 processes: {'bit-identical' if same else 'NOT THE SAME'}"
+    )
 
 
 def main() -> None:
@@ -146,7 +153,11 @@ def main() -> None:
     bend = plan(bend_moved(0.0), ArmSpec(link_length=560.0)).motion
     assert bend is not None
     results = {
-        "machine": {"processor": platform.machine(), "cores": os.cpu_count(), "python": platform.python_version()},
+        "machine": {
+            "processor": platform.machine(),
+            "cores": os.cpu_count(),
+            "python": platform.python_version(),
+        },
         "link_length_px": LINK_LENGTH,
         "index": LINK_LENGTH / LONGEST,
         "n_poses": motion.n_poses,
@@ -154,7 +165,8 @@ def main() -> None:
         "stages_s": stages,
         "verdicts": {
             "fig19, links of 430 px": [
-                verdict_row(motion, walls_moved(inward), inward) for inward in track(INWARD, description="fig19")
+                verdict_row(motion, walls_moved(inward), inward)
+                for inward in track(INWARD, description="fig19")
             ],
             "L, links of 560 px": [
                 verdict_row(bend, bend_moved(inward), inward) for inward in track(INWARD, description="L")

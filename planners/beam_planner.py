@@ -207,5 +207,5 @@ def _reason(ending: int, link: int, place: tuple[float, float], maze: Maze) -> s
     if ending == kernel.NO_GAP:
         return f"With its base-side joint at {where}, {which} has no free direction."
     if ending == kernel.JUMP:
-        return f"With its base-side joint at {where}, {which} would have to jump from one free direction to another."
+        return f"With its base-side joint at {where}, {which} would have to jump to another free direction."
     return f"All arm that the path can take is fed, and the tip is at {where}, not at the goal."

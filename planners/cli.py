@@ -172,7 +172,7 @@ def demo_command(
 
 
 def main() -> None:
-    """Run the command line: one sentence on stderr and exit code 2 for bad input, never a traceback for it."""
+    """Run the command line: one sentence on stderr and exit code 2 for bad input, no traceback."""
     try:
         code = app(standalone_mode=False)
     except InputError as error:
@@ -240,7 +240,8 @@ def _check_folder(path: Path) -> None:
 def _progress(quiet: bool) -> Iterator[Progress]:
     """Show a bar per stage on stderr, where somebody can see it."""
     from rich.console import Console
-    from rich.progress import BarColumn, Progress as Bars, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bars
 
     console = Console(stderr=True)
     columns = (TextColumn("{task.description:<10}"), BarColumn(), TimeElapsedColumn())

@@ -69,8 +69,8 @@ def draw_geometry(maze: Maze, motion: Motion | None, out: Path, link_radius: flo
     geometry = survey(maze, link_radius)
     if geometry is None:
         raise InputError(
-            f"Expected a maze with a path for links of radius {link_radius:g}, but none leads from the base of "
-            f"'{maze.name}' to its goal."
+            f"Expected a maze with a path for links of radius {link_radius:g}, but in '{maze.name}' none leads "
+            f"from the base to the goal."
         )
     picture = MazePicture(maze)
     _draw_beams(picture, geometry)
@@ -112,7 +112,7 @@ def _draw_beams(picture: MazePicture, geometry: Geometry) -> None:
 
 
 def draw_poses(maze: Maze, run: Run, out: Path) -> None:
-    """Draw five poses of a run side by side, evenly chosen, the last among them.
+    """Draw five poses of a run side by side, evenly chosen, the last among them; orange links pinch a wall.
 
     Parameters
     ----------
@@ -123,9 +123,9 @@ def draw_poses(maze: Maze, run: Run, out: Path) -> None:
     out : Path
         The picture (.png).
     """
-    picture = MazePicture(maze)
     panels = []
     for pose in np.linspace(0, len(run.joints) - 1, N_PANELS + 1).round().astype(int)[1:]:
+        picture = MazePicture(maze, title=f"pose {pose}")
         picture.draw_arm(run.joints[pose], pinched=run.pinched(pose), collided=run.collided(pose))
         panels.append(picture.rgb())
     with replacing(out) as part:
@@ -146,7 +146,7 @@ def animate(maze: Maze, run: Run, out: Path, progress: Progress | None = None) -
     progress : callable, optional
         Called with "animate" and the share done.
     """
-    picture = MazePicture(maze)
+    picture = MazePicture(maze, title="orange: pinches a wall")
     frames = np.unique(np.linspace(0, len(run.joints) - 1, N_FRAMES).round().astype(int))
     writer = PillowWriter(fps=FRAMES_PER_SECOND)
     with replacing(out) as part, writer.saving(picture.figure, part, dpi=picture.figure.dpi):

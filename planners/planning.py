@@ -90,7 +90,7 @@ def _with_wanted_links(motion: Motion, maze: Maze, arm: ArmSpec) -> Motion:
         return motion
     if arm.n_links < motion.n_links:
         raise InputError(
-            f"Expected at least {motion.n_links} links of {arm.link_length:g} {maze.units} to reach the goal of "
-            f"maze '{maze.name}', got {arm.n_links}."
+            f"Expected at least {motion.n_links} links of {arm.link_length:g} {maze.units} to reach the goal "
+            f"of maze '{maze.name}', got {arm.n_links}."
         )
     return motion.with_links(arm.n_links)

@@ -242,7 +242,7 @@ class ValidationReport:
     penetration : float
         Largest penetration depth at any pose, at least 0.
     penetration_between : float
-        Bound on the depth anywhere between poses, at least 0; infinite if no bound up to the tolerance was found.
+        Bound on the depth anywhere between poses, at least 0; infinite if none up to the tolerance was found.
     largest_step : float
         Largest movement of any joint between two poses.
     length_error : float

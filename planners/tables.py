@@ -141,7 +141,8 @@ def verdict_rows(maze: Maze, report: PinchReport) -> Rows:
             first = run.first_collision
             yield (
                 "  first",
-                f"pose {first.pose}, link {first.link}, at {_place(first.point)}, {-first.clearance:.4g} {units} deep",
+                f"pose {first.pose}, link {first.link}, at {_place(first.point)}, "
+                f"{-first.clearance:.4g} {units} deep",
             )
     yield "largest wall impulse", f"{report.largest_impulse:.4g} link masses x link lengths / s"
     yield "node error", f"{report.node_error:.4g} {units}"
@@ -195,7 +196,8 @@ def show_demo(demo: Demo) -> None:
         ("goal", "reached" if demo.episode.success else "NOT REACHED"),
         (
             "time: simulate",
-            f"{seconds(demo.episode.seconds)}, {seconds(demo.episode.seconds / demo.episode.n_steps)} per step",
+            f"{seconds(demo.episode.seconds)}, "
+            f"{seconds(demo.episode.seconds / demo.episode.n_steps)} per step",
         ),
     ]
     show_rows("Simulation", [*rows, *verdict_rows(demo.maze, demo.episode.report)])

@@ -21,7 +21,9 @@ POSES = st.tuples(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(-math.pi
 # From one link up, straight joints and joints almost folded back among them.
 ANGLES = st.integers(1, 60).flatmap(
     lambda n: arrays(
-        np.float64, n, elements=st.one_of(st.just(0.0), st.floats(-3.14, 3.14), st.sampled_from([-3.1415, 3.1415]))
+        np.float64,
+        n,
+        elements=st.one_of(st.just(0.0), st.floats(-3.14, 3.14), st.sampled_from([-3.1415, 3.1415])),
     )
 )
 ROUNDING = 1e-9  # of lengths up to 6e4

@@ -151,7 +151,10 @@ BAD_INPUT = [
     ("plan bow_tie.geojson --link-length 430", "Expected a valid polygon as free space"),
     ("plan empty.geojson --link-length 430", "Expected finite Polygon coordinates in the 'free' feature"),
     ("plan base_out.geojson --link-length 430", "Expected the base inside the free space, got (-500, 5)"),
-    ("plan goal_in_wall.geojson --link-length 430", "Expected the goal inside the free space, got (120, 700)"),
+    (
+        "plan goal_in_wall.geojson --link-length 430",
+        "Expected the goal inside the free space, got (120, 700)",
+    ),
     ("plan two_parts.geojson --link-length 430", "Expected a free way from the base to the goal"),
     ("plan fig19 --link-length 1596", "Expected one link length (1596 px) of straight free way"),
     ("plan fig19 --link-length 0", "Expected a positive, finite link_length, got 0.0."),

@@ -1,6 +1,7 @@
 """Laws of section 2 of the paper: potential, path, beams, corners."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -49,7 +50,7 @@ def test_the_potential_is_harmonic_and_between_wall_and_goal(name):
 
 
 def test_the_potential_decays_as_the_corridors_slowest_mode():
-    # In a corridor of n cells between walls, u falls by a factor x + sqrt(x^2 - 1), x = 2 - cos(pi / n), per cell.
+    # In a corridor of n cells, u falls by a factor x + sqrt(x^2 - 1), x = 2 - cos(pi / n), per cell.
     maze = Maze.from_corridors([(0, 0), (0, 20_000)], 200.0)
     potential = laplace_potential(maze, width=200.0)
     column = potential.u[:, potential.u.shape[1] // 2]
@@ -75,7 +76,7 @@ def test_paths_lead_from_base_to_goal_through_the_free_space(name):
 @pytest.mark.parametrize("name", ["L", "U200", "S400", "stairs", "spiral"])
 def test_every_turn_of_the_corridor_is_a_corner_with_its_side(name):
     legs = [TURNS[leg[0]] for leg in LEGS[name].split()]
-    expected = ["right" if (b - a) % 4 == 1 else "left" for a, b in zip(legs, legs[1:], strict=False)]
+    expected = ["right" if (b - a) % 4 == 1 else "left" for a, b in pairwise(legs)]
     assert [corner.name for corner in survey(MAZES[name]()).corners] == expected
 
 
@@ -105,7 +106,9 @@ def test_beams_are_perpendicular_and_end_on_walls(name):
 
 
 def test_the_passage_width_is_that_of_the_narrowest_place():
-    maze = Maze.from_corridors([[(0, 0), (0, 500)], [(0, 490), (0, 700)], [(0, 690), (0, 1500)]], [200, 60, 200])
+    maze = Maze.from_corridors(
+        [[(0, 0), (0, 500)], [(0, 490), (0, 700)], [(0, 690), (0, 1500)]], [200, 60, 200]
+    )
     assert passage_width(maze) == pytest.approx(60, rel=0.02)
 
 
@@ -123,7 +126,9 @@ def test_windowing_keeps_the_ends_and_straight_lines():
     zigzag = line + 0.1 * np.column_stack([np.zeros(40), (-1.0) ** np.arange(40)])
     smooth = windowed(zigzag, 6)
     np.testing.assert_allclose(smooth[[0, -1]], zigzag[[0, -1]], atol=1e-12)
-    np.testing.assert_allclose(np.abs(smooth - line)[6:-6, 1], 0.1 / 13, atol=1e-12)  # 13 points, one left over
+    np.testing.assert_allclose(
+        np.abs(smooth - line)[6:-6, 1], 0.1 / 13, atol=1e-12
+    )  # 13 points, one left over
     np.testing.assert_allclose(windowed(zigzag, 0), zigzag, atol=1e-12)
 
 

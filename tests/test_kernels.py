@@ -1,6 +1,7 @@
 """Twins: each kernel against a slow version in NumPy or shapely."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ def gaps_of(point, length, walls, pad=0.0):
 
 
 def is_in_gap(direction, gaps, slack):
-    """Tell whether a direction is inside a gap (True), outside (False), or within the slack of an end (None)."""
+    """Tell whether a direction is in a gap (True), in none (False), or too near to an end to say (None)."""
     for start, end in gaps:
         shift = (direction - start) % (2 * math.pi)
         if slack < shift < end - start - slack:
@@ -58,7 +59,7 @@ def test_free_intervals_are_apart_and_less_than_a_turn(point, length, walls):
     gaps = gaps_of(point, length, walls)
     assert all(end > start for start, end in gaps)
     assert sum(end - start for start, end in gaps) <= 2 * math.pi + 1e-12
-    assert all(after[0] >= before[1] for before, after in zip(gaps, gaps[1:], strict=False))
+    assert all(after[0] >= before[1] for before, after in pairwise(gaps))
 
 
 def test_a_rod_between_two_walls_is_free_in_the_hand_computed_intervals():
@@ -150,7 +151,7 @@ def circle_path(radius, n=400):
 
 
 def test_the_tangent_point_touches_a_circle_at_the_hand_computed_place():
-    # From a point at distance 2 r from the centre, the tangent touches at 60 degrees from the line of centres;
+    # From a point at distance 2 r from the centre, the tangent touches 60 degrees off the line of centres;
     # products too small to have a sign put it a few of the 400 points later.
     points, inside = circle_path(1.0), np.ones(400, dtype=np.int64)
     i = tangent_point(points, 2.0, 0.0, 0, 5.0, inside)

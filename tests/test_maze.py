@@ -36,7 +36,9 @@ def collection(**roles):
     for role, parts in {**good, **roles}.items():
         if parts is not None:
             properties = {key: value for key, value in parts.items() if key != "geometry"}
-            features.append({"type": "Feature", "properties": {"role": role, **properties}, "geometry": parts["geometry"]})
+            features.append(
+                {"type": "Feature", "properties": {"role": role, **properties}, "geometry": parts["geometry"]}
+            )
     return {"type": "FeatureCollection", "name": "box", "units": "m", "features": features}
 
 
@@ -204,7 +206,10 @@ def test_missing_and_broken_files_are_told_apart(tmp_path):
     ("arm", "message"),
     [
         (ArmSpec(link_length=36.0), "Expected one link length (36 px) of straight free way"),
-        (ArmSpec(link_length=150.0), "Expected a link_length of at most the size of maze 'hall' (141.421 px)"),
+        (
+            ArmSpec(link_length=150.0),
+            "Expected a link_length of at most the size of maze 'hall' (141.421 px)",
+        ),
         (ArmSpec(link_length=34.0, link_radius=2.0), "Expected one link length (34 px) of straight free way"),
     ],
 )

@@ -71,7 +71,10 @@ def test_joints_and_configurations_make_the_same_motion():
         (lambda path: path.write_bytes(b""), "got a file that is not one"),
         (lambda path: path.write_bytes(b"PK\x03\x04broken"), "got a file that is not one"),
         (lambda path: path.mkdir(), "got a file that is not one"),
-        (lambda path: np.savez(path, joints=np.zeros((2, 3, 2))), "missing: joint_angles, feed, link_length, base_pose"),
+        (
+            lambda path: np.savez(path, joints=np.zeros((2, 3, 2))),
+            "missing: joint_angles, feed, link_length, base_pose",
+        ),
     ],
 )
 def test_files_that_are_not_motions_are_refused(write, message, tmp_path):
@@ -97,7 +100,9 @@ def test_files_that_are_not_motions_are_refused(write, message, tmp_path):
 )
 def test_motions_with_wrong_arrays_are_refused(changes, message, tmp_path):
     motion = straight_motion()
-    arrays = {key: getattr(motion, key) for key in ("joints", "joint_angles", "feed", "link_length", "base_pose")}
+    arrays = {
+        key: getattr(motion, key) for key in ("joints", "joint_angles", "feed", "link_length", "base_pose")
+    }
     np.savez(tmp_path / "m.npz", **{**arrays, **changes})
     with pytest.raises(InputError, match=message):
         Motion.load(tmp_path / "m.npz")

@@ -1,7 +1,7 @@
 """Kernels of the beam planner: one function per subsection of section 3 of the paper, and the whole sweep.
 
-Every rule answers one question for one link: in which direction shall the link that starts at p point? Lengths
-are in maze units, angles in rad. Path points and beam ends share their indices.
+Every rule answers one question for one link: in which direction shall the link that starts at p point?
+Lengths are in maze units, angles in rad. Path points and beam ends share their indices.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from planners.kernels.types import FloatArray, IntArray
 TWO_PI = 2.0 * np.pi
 
 GOAL, TOO_LONG, NO_GAP, JUMP = 0, 1, 2, 3
-"""How a sweep ends: at the goal; with all arm fed; a link without a free direction; a joint that would jump."""
+"""How a sweep ends: at the goal; all arm fed; a link without a free direction; a joint that would jump."""
 
 FLAT = 1e-4
 """Sine below which two vectors count as parallel: straight legs have no tangent points, only rounding."""
@@ -26,9 +26,11 @@ TICKS = 128
 
 @njit(cache=True)
 def closest_index(points: FloatArray, px: float, py: float, around: int, reach: int) -> int:
-    """Find the path point closest to p, at most `reach` indices away from `around`.
+    """Find the path point closest to the end of a link (section 3.2), which is where the next one starts.
 
-    The search stays local: the other leg of a U-turn may be nearer than the own one.
+    The paper walks along the beams that the link crosses to the one through its end; a search of the closest
+    of the path points at most `reach` indices away from `around`, that of the last pose, finds the same. It
+    stays local: the other leg of a U-turn may be nearer than the own one.
     """
     best, best_squared = around, np.inf
     for i in range(max(0, around - reach), min(points.shape[0], around + reach + 1)):
@@ -179,9 +181,10 @@ def _place_links(
 ) -> int:
     """Place all links of one pose, base to tip, and return -1, or the link that has no free direction.
 
-    `first` is the link that is still held on the feeder's axis, next to the base. Links are numbered from the tip here, so that a number stays with its link as the arm is fed. `headings`,
-    `indices` (of the path point closest to each link's start), `tangent_to` (the corner, or 0) and `joints`
-    hold the last pose and are overwritten; `joints[k]` is the end of link k.
+    `first` is the link that is still held on the feeder's axis, next to the base. Links are numbered from the
+    tip here, so that a number stays with its link as the arm is fed. `headings`, `indices` (of the path point
+    closest to each link's start), `tangent_to` (the corner, or 0) and `joints` hold the last pose and are
+    overwritten; `joints[k]` is the end of link k.
     """
     axial = feed - first * length
     headings[first] = base_pose[2]
@@ -294,8 +297,8 @@ def sweep_poses(
         # A link whose joint is just at the base is still straight in that pose.
         first = (place + stride - 1) // per_link
         failed = _place_links(
-            first, feed, turn_limit, length, joint_limit, base_pose, points, left, right, corner_at, next_corner, reach,
-            walls, pad, blocked, gaps, new, index_new, tangent_new, joints_new,
+            first, feed, turn_limit, length, joint_limit, base_pose, points, left, right, corner_at,
+            next_corner, reach, walls, pad, blocked, gaps, new, index_new, tangent_new, joints_new,
         )  # fmt: skip
         if failed >= 0:
             largest = np.inf

@@ -91,7 +91,7 @@ def free_directions(
     if n == 0:
         gaps[0, 0], gaps[0, 1] = 0.0, TWO_PI
         return 1
-    # The largest end, one turn back, is where the first gap begins: so the gap across 0 needs no special case.
+    # The largest end, one turn back, is where the first gap begins: the gap across 0 is no special case.
     reach = blocked[0, 1]
     for k in range(1, n):
         reach = max(reach, blocked[k, 1])
