@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INPUTS := pyproject.toml constraints.txt
 
-.PHONY: demo test lint types contracts check format clean
+.PHONY: demo test kernels lint types contracts check format clean
 
 ## demo: plan, check and simulate the paper's benchmark; writes demo/
 demo: $(VENV)/.core
@@ -12,6 +12,10 @@ demo: $(VENV)/.core
 ## test: run all tests
 test: $(VENV)/.all
 	$(BIN)/python -m pytest
+
+## kernels: the tests of the kernels once more as plain Python, where an index out of bounds is an error
+kernels: $(VENV)/.all
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest tests/test_kernels.py tests/test_geometry.py tests/test_planning.py
 
 ## lint, types, contracts: what CI checks besides the tests
 lint: $(VENV)/.all
@@ -25,7 +29,7 @@ types: $(VENV)/.all
 contracts: $(VENV)/.all
 	$(BIN)/lint-imports
 
-check: lint types contracts test
+check: lint types contracts test kernels
 
 format: $(VENV)/.all
 	$(BIN)/ruff check --fix .

@@ -19,7 +19,10 @@ __all__ = ["GeodesicDistance"]
 CELLS = 200
 """Grid cells along the maze's diagonal, to begin with."""
 
+FINE_CELLS = 800
 MAX_CELLS = 1600
+"""The grid is refined up to these: to tell the sides of a thin wall apart, and to find a way at all."""
+
 STEPS = ((1, 0), (0, 1), (1, 1), (1, -1), (2, 1), (1, 2), (2, -1), (1, -2))
 """Half of the 16 neighbours of a grid node; the distances are then at most 2.8 % too long."""
 
@@ -27,8 +30,8 @@ STEPS = ((1, 0), (0, 1), (1, 1), (1, -1), (2, 1), (1, 2), (2, -1), (1, -2))
 class GeodesicDistance:
     """Tell how far it is from any place to the goal without crossing a wall.
 
-    Computed once on a grid (Dijkstra's algorithm), then interpolated. The grid is refined until the base
-    is joined to the goal.
+    Computed once on a grid (Dijkstra's algorithm), then interpolated. The grid is refined where it must be:
+    until the base is joined to the goal, and, within reason, until no cell has both sides of a wall.
 
     Parameters
     ----------
@@ -48,9 +51,10 @@ class GeodesicDistance:
         while True:
             self._cell = maze.size / cells
             self._build(maze)
-            if math.isfinite(self(maze.base_pose[:2])):
-                return
+            joined = math.isfinite(self(maze.base_pose[:2]))
             cells *= 2
+            if joined and (cells > FINE_CELLS or self._tells_sides_apart()):
+                return
             if cells > MAX_CELLS:
                 raise InputError(
                     f"Expected a way to the goal of maze '{maze.name}' that is wider than "
@@ -90,6 +94,13 @@ class GeodesicDistance:
         lengths = np.maximum(np.linalg.norm(places[starts] - places[ends], axis=1), 1e-9 * self._cell)
         graph = coo_array((lengths, (starts, ends)), shape=(len(places), len(places))).tocsr()
         self._grid = dijkstra(graph, directed=False, indices=len(nodes))[:-1].reshape(shape)
+
+    def _tells_sides_apart(self) -> bool:
+        corners = np.stack([self._grid[:-1, :-1], self._grid[1:, :-1], self._grid[:-1, 1:], self._grid[1:, 1:]])
+        finite = np.isfinite(corners)
+        highest = np.max(corners, axis=0, where=finite, initial=0.0)
+        lowest = np.min(corners, axis=0, where=finite, initial=math.inf)
+        return not np.any(highest - lowest > 8.0 * self._cell)
 
     def _edges(
         self, maze: Maze, nodes: FloatArray, free: np.ndarray, shape: tuple[int, int]

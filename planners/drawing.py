@@ -69,8 +69,8 @@ def draw_geometry(maze: Maze, motion: Motion | None, out: Path, link_radius: flo
     geometry = survey(maze, link_radius)
     if geometry is None:
         raise InputError(
-            f"Expected a maze with a path for links of radius {link_radius:g}, but in '{maze.name}' none leads "
-            f"from the base to the goal."
+            f"Expected a maze with a path for links of radius {link_radius:g}, but in '{maze.name}' none "
+            f"leads from the base to the goal."
         )
     picture = MazePicture(maze)
     _draw_beams(picture, geometry)

@@ -116,9 +116,9 @@ def test_grid_nodes_are_inside_exactly_where_shapely_says(name):
 
 def test_a_wall_thinner_than_a_cell_still_blocks():
     walls = np.array([[(0.4, -5.0), (0.4, 5.0)], [(0.5, 5.0), (0.5, -5.0)]])
-    inside, blocked_x, _ = scan_walls(walls, -3.0, -2.0, 1.0, 7, 5)
+    inside, blocked_x, _ = scan_walls(walls, -3.0, -7.0, 1.0, 7, 15)
     assert not inside.any()
-    assert blocked_x[:, 3].all()
+    assert blocked_x[2:12, 3].all()
 
 
 def test_closest_index_does_not_leave_its_neighbourhood():

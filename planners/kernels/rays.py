@@ -7,6 +7,9 @@ from numba import njit
 
 from planners.kernels.types import FloatArray
 
+PARALLEL = 1e-200
+"""Cross products below this would overflow as divisors."""
+
 
 @njit(cache=True)
 def cast_rays(origins: FloatArray, directions: FloatArray, walls: FloatArray, lengths: FloatArray) -> None:
@@ -33,7 +36,7 @@ def cast_rays(origins: FloatArray, directions: FloatArray, walls: FloatArray, le
             ax, ay = walls[k, 0, 0] - px, walls[k, 0, 1] - py
             ex, ey = walls[k, 1, 0] - walls[k, 0, 0], walls[k, 1, 1] - walls[k, 0, 1]
             cross = dx * ey - dy * ex
-            if cross == 0.0:
+            if abs(cross) < PARALLEL:
                 continue
             along_wall = (ax * dy - ay * dx) / cross
             if 0.0 <= along_wall <= 1.0:

@@ -1,0 +1,449 @@
+"""The simulator: rigid links in pymunk, driven by computed torque, among walls of exact shape."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pymunk
+import pymunk.batch
+from numpy.typing import ArrayLike
+
+from hrsnake_env.arm import ArmSpec, FloatArray
+from hrsnake_env.contacts import PINCH_TOLERANCE, Contact, ContactLog, PinchReport, pinch_report
+from hrsnake_env.dynamics import (
+    deviation,
+    largest_move,
+    limited_forces,
+    link_distances,
+    place_links,
+    servo_forces,
+    step_targets,
+)
+from hrsnake_env.errors import InputError
+from hrsnake_env.maze import Maze
+from hrsnake_env.space import SIM_LINK, TOLERANCE, ArmSpace
+from hrsnake_env.walls import Frame, wall_pieces
+
+__all__ = ["CONTROL_TIMESTEP", "Physics", "simulate"]
+
+CONTROL_TIMESTEP = 0.05
+"""In s: the time from one pose to the next."""
+
+LARGEST_MOVE = 0.013
+"""In link lengths: no joint moves farther in one substep, so that no wall of 0.011 or more is jumped unseen."""
+
+SLOT_TOLERANCES = 4.0
+"""The walls are open for the feeder by so many pinch tolerances more than a link is wide, on each side."""
+
+N_STATIC = 2
+"""Bodies that are no links: the one of the walls and, of a dynamic arm, the feeder's rail."""
+
+STATE = (
+    pymunk.batch.BodyFields.POSITION
+    | pymunk.batch.BodyFields.ANGLE
+    | pymunk.batch.BodyFields.VELOCITY
+    | pymunk.batch.BodyFields.ANGULAR_VELOCITY
+)
+POSES = pymunk.batch.BodyFields.POSITION | pymunk.batch.BodyFields.ANGLE
+FORCES = pymunk.batch.BodyFields.FORCE | pymunk.batch.BodyFields.TORQUE
+
+
+class Physics:
+    """Simulate an arm in a maze; lengths are in maze units, angles in rad, masses in link masses.
+
+    Links are dynamic bodies. In each substep every link gets the force that takes it to its place in the
+    next one; these forces equal joint torques and a feed force. Walls push back on what is deeper in them
+    than the pinch tolerance. The arm is one substep behind its target, as the simulator moves bodies
+    before it changes velocities; `node_error` allows for this.
+
+    Parameters
+    ----------
+    maze : Maze
+        The maze.
+    arm : ArmSpec
+        With `n_links`.
+    substeps : int
+        Simulated steps from pose to pose; more where a joint moves too far in one.
+    kinematic : bool
+        Place the links at their targets, whatever is in the way: contacts are then exact, nothing pushes.
+    torque_limit : float, optional
+        Each joint torque is cut to it, in link mass x link length^2 / s^2; the arm then falls behind where
+        it is too weak. None means no limit. Joints in the feeder are held by the feeder.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of its range.
+    """
+
+    def __init__(
+        self,
+        maze: Maze,
+        arm: ArmSpec,
+        *,
+        substeps: int = 4,
+        kinematic: bool = False,
+        torque_limit: float | None = None,
+    ) -> None:
+        if arm.n_links is None:
+            raise InputError("Expected an arm with a number of links (n_links), got None.")
+        if isinstance(substeps, bool) or not isinstance(substeps, int | np.integer) or substeps < 1:
+            raise InputError(f"Expected substeps to be a whole number of at least 1, got {substeps!r}.")
+        if torque_limit is not None and not torque_limit > 0.0:
+            raise InputError(f"Expected a positive torque_limit, or None, got {torque_limit!r}.")
+        self.maze, self.arm, self.substeps, self.kinematic = maze, arm, int(substeps), kinematic
+        self.n_links, self.link_length = int(arm.n_links), arm.link_length
+        self._torque_limit = math.inf if torque_limit is None else float(torque_limit) * SIM_LINK**2
+        x, y, heading = (float(value) for value in maze.base_pose)
+        self._frame = Frame(base_pose=(x, y, heading), scale=SIM_LINK / arm.link_length)
+        self._scale, self._radius = self._frame.scale, arm.link_radius * self._frame.scale
+        slot = self._radius + SLOT_TOLERANCES * TOLERANCE
+        self._pieces = wall_pieces(maze, self._frame, SIM_LINK, slot, (self.n_links + 1) * SIM_LINK)
+        self._surface = np.array([(*piece.start, *piece.end) for piece in self._pieces if piece.radius == 0.0])
+        self._allocate()
+        self.reset()
+
+    def _allocate(self) -> None:
+        n = self.n_links
+        self._targets = np.zeros((self.substeps, 1 + n))
+        self._all_poses = np.zeros((n + N_STATIC, 3))
+        self._poses = self._all_poses[:n]
+        self._nodes, self._last_nodes, self._sim_joints = (np.zeros((n + 1, 2)) for _ in range(3))
+        # pymunk's batches hold static bodies as well, after the links; short of numbers, it takes what comes
+        # next in memory.
+        self._state, self._forces = np.zeros((n, 6)), np.zeros((n + N_STATIC, 3))
+        self._clearance: FloatArray | None = None
+        self._torques, self._distances = np.zeros(n), np.zeros(n)
+        self._reader, self._writer = pymunk.batch.Buffer(), pymunk.batch.Buffer()
+        self._writer.set_float_buf((self._all_poses if self.kinematic else self._forces).reshape(-1))
+
+    # Running
+
+    def reset(self, feed: float = 0.0, joint_angles: ArrayLike | None = None) -> None:
+        """Put the arm at rest into a configuration, by default wholly into the feeder.
+
+        The simulator is built afresh: one that was used would not repeat an episode to the last bit.
+
+        Parameters
+        ----------
+        feed : float
+            In maze units.
+        joint_angles : array-like, shape (n_links,), optional
+            In rad. By default the arm is straight.
+        """
+        angles = np.zeros(self.n_links) if joint_angles is None else joint_angles
+        target = self._as_target(feed, angles)
+        self._target = self._divided(target, target)[-1].copy()
+        self._last_target = self._target.copy()
+        self._log = ContactLog(PINCH_TOLERANCE * self.link_length)
+        self._n_held, self._past_link_poses, self._active = self.n_links, 0, 0
+        self._worst_node_error = self._worst_drift = self._feed_force = 0.0
+        self._torques[:] = 0.0
+        place_links(self._target, SIM_LINK, self._poses, self._nodes)
+        self._last_nodes[:] = self._nodes
+        self._space = ArmSpace(
+            self._pieces,
+            self._poses,
+            self._radius,
+            kinematic=self.kinematic,
+            log=self._log,
+            frame=self._frame,
+            walls=self.maze.walls,
+        )
+        self._begin_pose(0)
+        self._read()
+        self._check_order()
+        self._feed_links(self._target[0])
+        if self.kinematic:
+            self._substep(0, self._target)
+
+    def advance(self, feed: float, joint_angles: ArrayLike) -> None:
+        """Move on to the next pose; in between the targets change linearly.
+
+        Joints that have not passed the base are held straight by the feeder.
+
+        Parameters
+        ----------
+        feed : float
+            In maze units.
+        joint_angles : array-like, shape (n_links,)
+            In rad.
+        """
+        end = self._as_target(feed, joint_angles)
+        targets = self._divided(self._target, end)
+        self._begin_pose(self.pose + 1)
+        for number, target in enumerate(targets):
+            self._substep(number, target)
+        self._target[:] = targets[-1]
+
+    def settle(self) -> None:
+        """Take one more substep, so that the links arrive where they were last sent."""
+        if not self.kinematic:
+            self._substep(self.substeps, self._target)
+
+    def _divided(self, start: FloatArray, end: FloatArray) -> FloatArray:
+        """Divide a change of the configuration, shape (substeps, 1 + n_links), so that no link jumps a wall."""
+        targets = self._targets
+        step_targets(start, end, SIM_LINK, targets)
+        parts = math.ceil(largest_move(start, targets, SIM_LINK) / (LARGEST_MOVE * SIM_LINK))
+        if parts > 1:
+            targets = np.empty((self.substeps * parts, 1 + self.n_links))
+            step_targets(start, end, SIM_LINK, targets)
+        return targets
+
+    def _substep(self, number: int, target: FloatArray) -> None:
+        if not self.finite:
+            return  # pymunk's own checks would end the process
+        self._nodes, self._last_nodes = self._last_nodes, self._nodes
+        place_links(target, SIM_LINK, self._poses, self._nodes)
+        self._space.substep = number
+        self._feed_links(target[0])
+        timestep = CONTROL_TIMESTEP / self.substeps
+        if self.kinematic:
+            pymunk.batch.set_space_bodies(self._space.space, POSES, self._writer)
+        else:
+            self._compute_forces(target, timestep)
+            self._last_target[:] = target
+            pymunk.batch.set_space_bodies(self._space.space, FORCES, self._writer)
+        self._space.step(timestep)
+        self._read()
+
+    def _compute_forces(self, target: FloatArray, timestep: float) -> None:
+        n_held, forces, torques = self._n_held, self._forces, self._torques
+        self._feed_force = servo_forces(
+            self._state, self._poses, SIM_LINK, timestep, n_held, forces, torques
+        )
+        if np.abs(torques).max() > self._torque_limit:
+            self._feed_force = limited_forces(
+                self._state,
+                self._last_target,
+                target,
+                SIM_LINK,
+                timestep,
+                self._torque_limit,
+                n_held,
+                forces,
+                torques,
+            )
+
+    def _feed_links(self, feed: float) -> None:
+        """Let links collide as soon as their tip end has passed the base."""
+        n_held = min(max(math.floor(self.n_links - feed / SIM_LINK) + 1, 0), self.n_links)
+        # Dynamic links are still where their last target has sent them.
+        self._space.n_held = n_held if self.kinematic else max(n_held, self._n_held)
+        first_active = max(n_held - 1, 0)
+        self._n_held = n_held
+        self._space.activate_links(first_active)
+        self._active = max(self._active, self.n_links - first_active)
+
+    def _read(self) -> None:
+        """Read all bodies, and compare them with where they belong."""
+        self._clearance = None
+        self._reader.clear()
+        pymunk.batch.get_space_bodies(self._space.space, STATE, self._reader)
+        self._state[:] = np.frombuffer(self._reader.float_buf()).reshape(-1, 6)[: self.n_links]
+        nodes = self._nodes if self.kinematic else self._last_nodes
+        error, drift = deviation(self._state, nodes, SIM_LINK, self._sim_joints)
+        if math.isnan(error):
+            error = drift = math.inf
+        self._node_error = max(self._node_error, error / self._scale)
+        self._drift = max(self._drift, drift / self._scale)
+        self._worst_node_error = max(self._worst_node_error, self._node_error)
+        self._worst_drift = max(self._worst_drift, self._drift)
+
+    def _begin_pose(self, pose: int) -> None:
+        self.pose = pose
+        self._log.begin_pose(pose)
+        self._space.clearances[:] = math.inf
+        self._node_error = self._drift = 0.0
+        self._past_link_poses += self._active
+        self._active = 0
+
+    def _as_target(self, feed: float, joint_angles: ArrayLike) -> FloatArray:
+        angles = np.asarray(joint_angles, dtype=np.float64)
+        if angles.shape != (self.n_links,):
+            raise InputError(f"Expected joint_angles with shape ({self.n_links},), got {angles.shape}.")
+        target = np.empty(1 + self.n_links)
+        target[0], target[1:] = float(feed) * self._scale, angles
+        if not np.isfinite(target).all():
+            raise InputError("Expected a finite feed and finite joint_angles, got NaN or infinity.")
+        return target
+
+    def _check_order(self) -> None:
+        """Make sure that pymunk's batches hold the links in our order, and then what stands still at the origin."""
+        states = np.frombuffer(self._reader.float_buf()).reshape(-1, 6)
+        assert len(states) <= self.n_links + N_STATIC
+        assert np.array_equal(states[: self.n_links, :3], self._poses)
+        assert not states[self.n_links :].any()
+
+    # Readings
+
+    @property
+    def joints(self) -> FloatArray:
+        """Joint positions, base end first, shape (n_links + 1, 2), in maze units."""
+        return self._frame.to_maze(self._sim_joints)
+
+    @property
+    def target(self) -> FloatArray:
+        """Feed and joint angles that the arm was last sent to, shape (1 + n_links,), in maze units and rad."""
+        target = self._target.copy()
+        target[0] /= self._scale
+        return target
+
+    @property
+    def target_joints(self) -> FloatArray:
+        """Where the joints were last sent, shape (n_links + 1, 2), in maze units."""
+        return self._frame.to_maze(self._nodes)
+
+    @property
+    def tip_position(self) -> FloatArray:
+        """The tip, shape (2,), in maze units."""
+        x, y = self._sim_joints[-1]
+        return np.array(self._frame.place_in_maze((float(x), float(y))))
+
+    @property
+    def tip_heading(self) -> float:
+        """Heading of the last link, in rad."""
+        return float(self._state[-1, 2]) + self._frame.base_pose[2]
+
+    @property
+    def feed(self) -> float:
+        """Length of arm pushed past the base, in maze units."""
+        return float(self._sim_joints[0, 0]) / self._scale + self.n_links * self.link_length
+
+    @property
+    def joint_angles(self) -> FloatArray:
+        """Joint angles, shape (n_links,), in rad."""
+        return _relative(self._state[:, 2])
+
+    @property
+    def feed_speed(self) -> float:
+        """In maze units / s."""
+        return float(self._state[0, 3]) / self._scale
+
+    @property
+    def joint_speeds(self) -> FloatArray:
+        """Speeds of the joint angles, shape (n_links,), in rad / s."""
+        return _relative(self._state[:, 5])
+
+    @property
+    def torques(self) -> FloatArray:
+        """Joint torques of the last substep, shape (n_links,), in link mass x link length^2 / s^2.
+
+        0 for joints in the feeder.
+        """
+        return self._torques / SIM_LINK**2
+
+    @property
+    def feed_force(self) -> float:
+        """Force along the feeder in the last substep, in link mass x link length / s^2."""
+        return self._feed_force / SIM_LINK
+
+    @property
+    def node_error(self) -> float:
+        """Largest distance of a link's end from where it belonged, within the last pose, in maze units."""
+        return self._node_error
+
+    @property
+    def drift(self) -> float:
+        """Largest gap between joined links within the last pose, in maze units."""
+        return self._drift
+
+    @property
+    def finite(self) -> bool:
+        """Whether all numbers are finite; a simulation that has broken down stands still."""
+        return math.isfinite(self._node_error)
+
+    @property
+    def clearance(self) -> FloatArray:
+        """Clearance of each link to the walls, shape (n_links,), in maze units.
+
+        Exact where it is positive, at most one link length, and that in the feeder. Where a link has touched
+        something within the last pose, the smallest clearance of the contacts, negative below the surface.
+        """
+        if self._clearance is None:
+            link_distances(self._sim_joints, self._n_held, self._surface, SIM_LINK, self._distances)
+            free = np.where(self._distances < SIM_LINK, self._distances - self._radius, SIM_LINK)
+            self._clearance = np.minimum(free, self._space.clearances) / self._scale
+        return self._clearance.copy()
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """All contacts since the reset."""
+        return self._log.contacts
+
+    @property
+    def pose_contacts(self) -> tuple[Contact, ...]:
+        """The contacts within the last pose."""
+        return self._log.current
+
+    def report(self) -> PinchReport:
+        """Sum up the contacts since the reset."""
+        return pinch_report(
+            self.contacts,
+            n_poses=self.pose + 1,
+            n_links=self.n_links,
+            link_poses=self._past_link_poses + self._active,
+            link_length=self.link_length,
+            node_error=self._worst_node_error,
+            drift=self._worst_drift,
+        )
+
+
+def _relative(values: FloatArray) -> FloatArray:
+    """Return each link's value relative to the previous link's, the first as it is."""
+    relative = values.copy()
+    relative[1:] -= values[:-1]
+    return relative
+
+
+def simulate(
+    maze: Maze,
+    arm: ArmSpec,
+    feed: ArrayLike,
+    joint_angles: ArrayLike,
+    *,
+    substeps: int = 4,
+    kinematic: bool = False,
+    torque_limit: float | None = None,
+) -> PinchReport:
+    """Run the poses of a motion through the simulator, and say whether links merely pinched the walls.
+
+    Parameters
+    ----------
+    maze : Maze
+        The maze.
+    arm : ArmSpec
+        The arm; its number of links is that of `joint_angles`.
+    feed : array-like, shape (n_poses,)
+        In maze units.
+    joint_angles : array-like, shape (n_poses, n_links)
+        In rad.
+    substeps, torque_limit
+        As `Physics` has them.
+    kinematic : bool
+        Run the exact pass alone. By default the report is of the dynamic run, and holds the exact pass.
+
+    Returns
+    -------
+    report : PinchReport
+    """
+    feeds, angles = np.asarray(feed, dtype=np.float64), np.asarray(joint_angles, dtype=np.float64)
+    if angles.ndim != 2 or feeds.shape != angles.shape[:1] or len(feeds) == 0:
+        raise InputError(
+            f"Expected feed with shape (n_poses,) and joint_angles with shape (n_poses, n_links), "
+            f"got {feeds.shape} and {angles.shape}."
+        )
+    arm = dataclasses.replace(arm, n_links=angles.shape[1])
+    physics = Physics(maze, arm, substeps=substeps, kinematic=kinematic, torque_limit=torque_limit)
+    physics.reset(feeds[0], angles[0])
+    for k in range(1, len(feeds)):
+        physics.advance(feeds[k], angles[k])
+    physics.settle()
+    report = physics.report()
+    if kinematic:
+        return report
+    exact = simulate(maze, arm, feeds, angles, substeps=substeps, kinematic=True)
+    return dataclasses.replace(report, kinematic=exact)
