@@ -116,6 +116,7 @@ class Physics:
         self._state, self._forces = np.zeros((n, 6)), np.zeros((n + N_STATIC, 3))
         self._clearance: FloatArray | None = None
         self._torques, self._distances = np.zeros(n), np.zeros(n)
+        self._effort, self._n_efforts = np.zeros(1 + n), 0
         self._reader, self._writer = pymunk.batch.Buffer(), pymunk.batch.Buffer()
         self._writer.set_float_buf((self._all_poses if self.kinematic else self._forces).reshape(-1))
 
@@ -140,7 +141,6 @@ class Physics:
         self._log = ContactLog(PINCH_TOLERANCE * self.link_length)
         self._n_held, self._past_link_poses, self._active = self.n_links, 0, 0
         self._worst_node_error = self._worst_drift = self._feed_force = 0.0
-        self._torques[:] = 0.0
         place_links(self._target, SIM_LINK, self._poses, self._nodes)
         self._last_nodes[:] = self._nodes
         self._space = ArmSpace(
@@ -206,6 +206,8 @@ class Physics:
         else:
             self._compute_forces(target, timestep)
             self._last_target[:] = target
+            self._effort += (self._feed_force, *self._torques)
+            self._n_efforts += 1
             pymunk.batch.set_space_bodies(self._space.space, FORCES, self._writer)
         self._space.step(timestep)
         self._read()
@@ -258,6 +260,7 @@ class Physics:
         self._log.begin_pose(pose)
         self._space.clearances[:] = math.inf
         self._node_error = self._drift = 0.0
+        self._effort[:], self._n_efforts = 0.0, 0
         self._past_link_poses += self._active
         self._active = 0
 
@@ -330,16 +333,16 @@ class Physics:
 
     @property
     def torques(self) -> FloatArray:
-        """Joint torques of the last substep, shape (n_links,), in link mass x link length^2 / s^2.
+        """Mean joint torques within the last pose, shape (n_links,), in link mass x link length^2 / s^2.
 
         0 for joints in the feeder.
         """
-        return self._torques / SIM_LINK**2
+        return self._effort[1:] / (max(self._n_efforts, 1) * SIM_LINK**2)
 
     @property
     def feed_force(self) -> float:
-        """Force along the feeder in the last substep, in link mass x link length / s^2."""
-        return self._feed_force / SIM_LINK
+        """Mean force along the feeder within the last pose, in link mass x link length / s^2."""
+        return float(self._effort[0]) / (max(self._n_efforts, 1) * SIM_LINK)
 
     @property
     def node_error(self) -> float:

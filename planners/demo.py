@@ -88,6 +88,10 @@ def run_demo(folder: Path, progress: Progress | None = None) -> Demo:
         The outcome.
     """
     maze, arm = Maze.load("fig19"), ArmSpec(link_length=LINK_LENGTH)
+    tell = progress if progress is not None else lambda stage, share: None
+    tell("compile", 0.0)
+    plan(maze, arm)  # the first plan on a machine compiles the kernels, which would hide the times shown
+    tell("compile", 1.0)
     result = plan(maze, arm, progress=progress)
     if result.motion is None:
         return Demo(maze=maze, arm=arm, result=result, episode=None, files=())
