@@ -7,7 +7,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-__all__ = ["PINCH_TOLERANCE", "Contact", "ContactKey", "ContactLog", "PinchReport", "Place", "Touch", "pinch_report"]
+__all__ = [
+    "PINCH_TOLERANCE",
+    "Contact",
+    "ContactKey",
+    "ContactLog",
+    "PinchReport",
+    "Place",
+    "Touch",
+    "pinch_report",
+]
 
 PINCH_TOLERANCE = 0.001
 """In link lengths: nearer than this to a wall, on either side of its surface, a link pinches it."""
@@ -290,7 +299,11 @@ def _worst_touches(contacts: Iterable[Contact]) -> tuple[Touch, ...]:
         if place not in worst or contact.clearance < worst[place].clearance:
             worst[place] = contact
     touches = [
-        Touch(wall=contact.wall if contact.wall is not None else -1, corner=contact.corner, clearance=contact.clearance)
+        Touch(
+            wall=contact.wall if contact.wall is not None else -1,
+            corner=contact.corner,
+            clearance=contact.clearance,
+        )
         for contact in worst.values()
     ]
     return tuple(sorted(touches, key=lambda touch: (touch.wall, touch.corner or (math.inf, math.inf))))

@@ -12,7 +12,15 @@ import numpy as np
 
 from hrsnake_env.arm import FEEDER_RELEASE, FloatArray
 
-__all__ = ["deviation", "largest_move", "limited_forces", "link_distances", "place_links", "servo_forces", "step_targets"]
+__all__ = [
+    "deviation",
+    "largest_move",
+    "limited_forces",
+    "link_distances",
+    "place_links",
+    "servo_forces",
+    "step_targets",
+]
 
 
 PATIENCE = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0)
@@ -20,9 +28,7 @@ PATIENCE = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0)
 
 
 @numba.njit(cache=True)
-def step_targets(
-    start: FloatArray, end: FloatArray, link_length: float, targets: FloatArray
-) -> None:
+def step_targets(start: FloatArray, end: FloatArray, link_length: float, targets: FloatArray) -> None:
     """Divide a change of the configuration into substeps, linear in feed and joint angles.
 
     Parameters
@@ -30,7 +36,8 @@ def step_targets(
     start, end : array, shape (1 + n_links,)
         Feed and joint angles, in simulator units and rad.
     targets : array, shape (substeps, 1 + n_links)
-        Written; the last is `end`. Joints that the feeder holds are straight, as in `hrsnake_env.arm.feeder_angle_limits`.
+        Written; the last is `end`. Joints that the feeder holds are straight, as in
+        `hrsnake_env.arm.feeder_angle_limits`.
 
     Notes
     -----
@@ -193,9 +200,9 @@ def limited_forces(
 
     Notes
     -----
-    Known is where the links go if they coast, and what torques that takes. To turn faster by a, the free links
-    take M a in addition, M being their mass matrix with respect to their headings. If the target cannot be
-    reached in one substep, all links together take more of them, as a critically damped oscillator does:
+    Known is where the links go if they coast, and what torques that takes. To turn faster by a, the free
+    links take M a in addition, M being their mass matrix with respect to their headings. If the target cannot
+    be reached in one substep, all links together take more of them, as a critically damped oscillator does:
     a = e / T^2 + 2 e' / T, with the smallest T that keeps to the limit. What is still too much is cut.
     """
     n_links = target.shape[0] - 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hrsnake_env import task
 from hrsnake_env.arm import ArmSpec, FloatArray
-from hrsnake_env.contacts import PinchReport
+from hrsnake_env.contacts import Contact, PinchReport
 from hrsnake_env.dynamics import largest_move, step_targets
 from hrsnake_env.errors import InputError
 from hrsnake_env.geodesic import GeodesicDistance
@@ -26,7 +26,7 @@ __all__ = ["HyperRedundantMazeEnv"]
 RESET_OPTIONS = ("feed", "joint_angles")
 
 
-class HyperRedundantMazeEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
+class HyperRedundantMazeEnv(gym.Env[Any, Any]):
     """A planar arm of many rigid links is fed into a maze, and shall reach the goal with its tip.
 
     ## Description
@@ -46,16 +46,16 @@ class HyperRedundantMazeEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     `Box(low, 1, (4 * n_links + 8,), float32)`; everything is cut to its bounds.
 
-    | part          | number      | meaning                                                        | min | max |
-    |---------------|-------------|----------------------------------------------------------------|-----|-----|
-    | feed          | 1           | length of arm past the base / length of the arm                | 0   | 1   |
-    | joint_angles  | n_links     | relative to the previous link / pi                             | -1  | 1   |
-    | target_errors | 1 + n_links | target minus feed and joint angles / largest change in a step  | -1  | 1   |
-    | speeds        | 1 + n_links | of feed and joint angles / largest change in a step            | -1  | 1   |
-    | goal_offset   | 2           | x and y from the tip to the goal / size of the maze            | -1  | 1   |
-    | tip_heading   | 2           | cosine and sine                                                | -1  | 1   |
-    | goal_distance | 1           | from the tip round the walls / the same from the base, halved  | 0   | 1   |
-    | clearances    | n_links     | of each link to the walls / link length                        | -1  | 1   |
+    | part          | number      | meaning                                                      | min | max |
+    |---------------|-------------|--------------------------------------------------------------|-----|-----|
+    | feed          | 1           | length of arm past the base / length of the arm              | 0   | 1   |
+    | joint_angles  | n_links     | relative to the previous link / pi                           | -1  | 1   |
+    | target_errors | 1 + n_links | target minus feed and joint angles / largest change in a step| -1  | 1   |
+    | speeds        | 1 + n_links | of feed and joint angles / largest change in a step          | -1  | 1   |
+    | goal_offset   | 2           | x and y from the tip to the goal / size of the maze          | -1  | 1   |
+    | tip_heading   | 2           | cosine and sine                                              | -1  | 1   |
+    | goal_distance | 1           | from the tip round the walls / the same from the base, halved| 0   | 1   |
+    | clearances    | n_links     | of each link to the walls / link length                      | -1  | 1   |
 
     ## Rewards
 
@@ -111,7 +111,7 @@ class HyperRedundantMazeEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     - v0: first version.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
+    metadata: dict[str, Any] = {  # noqa: RUF012
         "render_modes": ["rgb_array"],
         "render_fps": round(1 / CONTROL_TIMESTEP),
     }
@@ -147,6 +147,7 @@ class HyperRedundantMazeEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._terminate_on_collision = terminate_on_collision
         self._step_limits = np.array([task.FEED_STEP * link_length, *([task.JOINT_STEP] * n_links)])
         self._picture: MazePicture | None = None
+        self._distance = self._way
         self._start(0.0, np.zeros(n_links))
 
     # The Gymnasium interface
@@ -161,9 +162,8 @@ class HyperRedundantMazeEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if unknown:
             raise InputError(f"Unknown reset option {unknown[0]!r}. Available: {', '.join(RESET_OPTIONS)}.")
         self._start(options.get("feed", 0.0), options.get("joint_angles", np.zeros(self.physics.n_links)))
-        return self._observation(), self._info(
-            task.StepOutcome(progress=0.0, collided=False, succeeded=False)
-        )
+        outcome = task.StepOutcome(progress=0.0, collided=False, succeeded=False)
+        return self._observation(), self._info(outcome, ())
 
     def step(
         self, action: NDArray[np.floating[Any]]
@@ -172,7 +172,8 @@ class HyperRedundantMazeEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._target = self._next_target(self._checked(action))
         self.physics.advance(self._target[0], self._target[1:])
         before, self._distance = self._distance, self._distance_now()
-        collided = any(contact.kind == "collision" for contact in self.physics.pose_contacts)
+        contacts = self.physics.pose_contacts
+        collided = any(contact.kind == "collision" for contact in contacts)
         jammed = task.is_jammed(self.physics)
         failed = jammed or (collided and self._terminate_on_collision)
         outcome = task.StepOutcome(
@@ -180,14 +181,16 @@ class HyperRedundantMazeEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             collided=collided,
             succeeded=not failed and self._tip_distance() <= self.maze.goal_radius,
         )
-        info = self._info(outcome)
+        info = self._info(outcome, contacts)
         reward = sum(task.reward_terms(outcome).values())
         return self._observation(), reward, failed or outcome.succeeded, False, info
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """Return a picture of the arm in the maze, shape (height, width, 3); None without a render mode."""
         if self.render_mode is None:
-            gym.logger.warn('Calling render() without a render mode; pass render_mode="rgb_array" to gym.make.')
+            gym.logger.warn(
+                'Calling render() without a render mode; pass render_mode="rgb_array" to gym.make.'
+            )
             return None
         if self._picture is None:
             self._picture = MazePicture(self.maze)
@@ -232,13 +235,15 @@ class HyperRedundantMazeEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         for _ in range(20):
             wanted = self._target + change
             wanted[0] = min(max(wanted[0], 0.0), self.physics.n_links * self.arm.link_length)
-            targets = np.empty((1, len(wanted)))
+            targets: FloatArray = np.empty((1, len(wanted)))
             step_targets(self._target, wanted, self.arm.link_length, targets)  # straight in the feeder
             move = largest_move(self._target, targets, self.arm.link_length)
             if move <= largest * (1.0 + 1e-6):
-                return targets[0]
+                break
             change *= largest / move
-        return self._target
+        else:
+            return self._target
+        return np.ascontiguousarray(targets[0])
 
     def _tip_distance(self) -> float:
         return float(np.linalg.norm(self.physics.tip_position - self.maze.goal))
@@ -251,8 +256,7 @@ class HyperRedundantMazeEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _observation(self) -> NDArray[np.float32]:
         return task.observation(self.physics, self._target, min(self._distance / (2.0 * self._way), 1.0))
 
-    def _info(self, outcome: task.StepOutcome) -> dict[str, Any]:
-        contacts = self.physics.pose_contacts
+    def _info(self, outcome: task.StepOutcome, contacts: tuple[Contact, ...]) -> dict[str, Any]:
         return {
             "success": outcome.succeeded,
             "is_success": outcome.succeeded,
@@ -262,7 +266,9 @@ class HyperRedundantMazeEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             "clearance": float(self.physics.clearance.min()),
             "pinches": len({contact.link for contact in contacts if contact.kind == "pinch"}),
             "collisions": len({contact.link for contact in contacts if contact.kind == "collision"}),
-            "depth": max((-contact.clearance for contact in contacts if contact.clearance < 0.0), default=0.0),
+            "depth": max(
+                (-contact.clearance for contact in contacts if contact.clearance < 0.0), default=0.0
+            ),
             "impulse": max((contact.impulse for contact in contacts), default=0.0),
             "node_error": self.physics.node_error,
             "drift": self.physics.drift,

@@ -68,7 +68,12 @@ class GeodesicDistance:
         i, j = min(max(int(x), 0), rows - 2), min(max(int(y), 0), columns - 2)
         u, v = min(max(x - i, 0.0), 1.0), min(max(y - j, 0.0), 1.0)
         total, weight = 0.0, 0.0
-        for di, dj, share in ((0, 0, (1 - u) * (1 - v)), (1, 0, u * (1 - v)), (0, 1, (1 - u) * v), (1, 1, u * v)):
+        for di, dj, share in (
+            (0, 0, (1 - u) * (1 - v)),
+            (1, 0, u * (1 - v)),
+            (0, 1, (1 - u) * v),
+            (1, 1, u * v),
+        ):
             value = self._grid[i + di, j + dj]
             if value < math.inf:
                 share = max(share, 1e-9)  # a point on a grid line next to a wall
@@ -86,7 +91,9 @@ class GeodesicDistance:
         free = shapely.contains_xy(maze.free_space, nodes[:, 0], nodes[:, 1])
         starts, ends = self._edges(maze, nodes, free, shape)
         near_goal = np.flatnonzero(free & (np.linalg.norm(nodes - self._goal, axis=1) <= 3 * self._cell))
-        lines = shapely.linestrings(np.stack([nodes[near_goal], np.broadcast_to(self._goal, (len(near_goal), 2))], 1))
+        lines = shapely.linestrings(
+            np.stack([nodes[near_goal], np.broadcast_to(self._goal, (len(near_goal), 2))], 1)
+        )
         near_goal = near_goal[shapely.covers(maze.free_space, lines)]
         starts = np.concatenate([starts, near_goal])
         ends = np.concatenate([ends, np.full(len(near_goal), len(nodes))])
@@ -96,7 +103,9 @@ class GeodesicDistance:
         self._grid = dijkstra(graph, directed=False, indices=len(nodes))[:-1].reshape(shape)
 
     def _tells_sides_apart(self) -> bool:
-        corners = np.stack([self._grid[:-1, :-1], self._grid[1:, :-1], self._grid[:-1, 1:], self._grid[1:, 1:]])
+        corners = np.stack(
+            [self._grid[:-1, :-1], self._grid[1:, :-1], self._grid[:-1, 1:], self._grid[1:, 1:]]
+        )
         finite = np.isfinite(corners)
         highest = np.max(corners, axis=0, where=finite, initial=0.0)
         lowest = np.min(corners, axis=0, where=finite, initial=math.inf)

@@ -32,7 +32,7 @@ CONTROL_TIMESTEP = 0.05
 """In s: the time from one pose to the next."""
 
 LARGEST_MOVE = 0.013
-"""In link lengths: no joint moves farther in one substep, so that no wall of 0.011 or more is jumped unseen."""
+"""In link lengths: no joint moves farther in one substep, so that no wall of 0.011 is jumped unseen."""
 
 SLOT_TOLERANCES = 4.0
 """The walls are open for the feeder by so many pinch tolerances more than a link is wide, on each side."""
@@ -101,7 +101,9 @@ class Physics:
         self._scale, self._radius = self._frame.scale, arm.link_radius * self._frame.scale
         slot = self._radius + SLOT_TOLERANCES * TOLERANCE
         self._pieces = wall_pieces(maze, self._frame, SIM_LINK, slot, (self.n_links + 1) * SIM_LINK)
-        self._surface = np.array([(*piece.start, *piece.end) for piece in self._pieces if piece.radius == 0.0])
+        self._surface = np.array(
+            [(*piece.start, *piece.end) for piece in self._pieces if piece.radius == 0.0]
+        )
         self._allocate()
         self.reset()
 
@@ -116,7 +118,9 @@ class Physics:
         self._state, self._forces = np.zeros((n, 6)), np.zeros((n + N_STATIC, 3))
         self._clearance: FloatArray | None = None
         self._torques, self._distances = np.zeros(n), np.zeros(n)
-        self._effort, self._n_efforts = np.zeros(1 + n), 0
+        self._effort = np.zeros(1 + n)
+        self._n_efforts = 0
+        self._node_error = self._drift = self._feed_force = 0.0
         self._reader, self._writer = pymunk.batch.Buffer(), pymunk.batch.Buffer()
         self._writer.set_float_buf((self._all_poses if self.kinematic else self._forces).reshape(-1))
 
@@ -184,7 +188,7 @@ class Physics:
             self._substep(self.substeps, self._target)
 
     def _divided(self, start: FloatArray, end: FloatArray) -> FloatArray:
-        """Divide a change of the configuration, shape (substeps, 1 + n_links), so that no link jumps a wall."""
+        """Divide a change of configuration so that no link jumps a wall, shape (substeps, 1 + n_links)."""
         targets = self._targets
         step_targets(start, end, SIM_LINK, targets)
         parts = math.ceil(largest_move(start, targets, SIM_LINK) / (LARGEST_MOVE * SIM_LINK))
@@ -214,9 +218,7 @@ class Physics:
 
     def _compute_forces(self, target: FloatArray, timestep: float) -> None:
         n_held, forces, torques = self._n_held, self._forces, self._torques
-        self._feed_force = servo_forces(
-            self._state, self._poses, SIM_LINK, timestep, n_held, forces, torques
-        )
+        self._feed_force = servo_forces(self._state, self._poses, SIM_LINK, timestep, n_held, forces, torques)
         if np.abs(torques).max() > self._torque_limit:
             self._feed_force = limited_forces(
                 self._state,
@@ -248,7 +250,7 @@ class Physics:
         self._state[:] = np.frombuffer(self._reader.float_buf()).reshape(-1, 6)[: self.n_links]
         nodes = self._nodes if self.kinematic else self._last_nodes
         error, drift = deviation(self._state, nodes, SIM_LINK, self._sim_joints)
-        if math.isnan(error):
+        if math.isnan(error) or not self._space.finite:
             error = drift = math.inf
         self._node_error = max(self._node_error, error / self._scale)
         self._drift = max(self._drift, drift / self._scale)
@@ -259,8 +261,10 @@ class Physics:
         self.pose = pose
         self._log.begin_pose(pose)
         self._space.clearances[:] = math.inf
-        self._node_error = self._drift = 0.0
-        self._effort[:], self._n_efforts = 0.0, 0
+        if self.finite:
+            self._node_error = self._drift = 0.0
+        self._effort[:] = 0.0
+        self._n_efforts = 0
         self._past_link_poses += self._active
         self._active = 0
 
@@ -275,7 +279,7 @@ class Physics:
         return target
 
     def _check_order(self) -> None:
-        """Make sure that pymunk's batches hold the links in our order, and then what stands still at the origin."""
+        """Make sure that pymunk's batches hold the links in our order, then what stands at the origin."""
         states = np.frombuffer(self._reader.float_buf()).reshape(-1, 6)
         assert len(states) <= self.n_links + N_STATIC
         assert np.array_equal(states[: self.n_links, :3], self._poses)
@@ -290,8 +294,8 @@ class Physics:
 
     @property
     def target(self) -> FloatArray:
-        """Feed and joint angles that the arm was last sent to, shape (1 + n_links,), in maze units and rad."""
-        target = self._target.copy()
+        """Where feed and joint angles were last sent, shape (1 + n_links,), in maze units and rad."""
+        target: FloatArray = self._target.copy()
         target[0] /= self._scale
         return target
 
@@ -357,7 +361,7 @@ class Physics:
     @property
     def finite(self) -> bool:
         """Whether all numbers are finite; a simulation that has broken down stands still."""
-        return math.isfinite(self._node_error)
+        return math.isfinite(self._worst_node_error)
 
     @property
     def clearance(self) -> FloatArray:

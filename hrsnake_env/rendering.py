@@ -63,9 +63,7 @@ class ArmDrawing:
         for artist in self.artists:
             axes.add_line(artist)
 
-    def move(
-        self, joints: ArrayLike, pinched: Collection[int] = (), collided: Collection[int] = ()
-    ) -> None:
+    def move(self, joints: ArrayLike, pinched: Collection[int] = (), collided: Collection[int] = ()) -> None:
         """Show a pose.
 
         Parameters
@@ -149,8 +147,9 @@ class MazePicture:
 
     def rgb(self) -> NDArray[np.uint8]:
         """Return the picture, shape (height, width, 3)."""
-        self._canvas.draw()
-        return np.asarray(self._canvas.buffer_rgba())[:, :, :3].copy()
+        self._canvas.draw()  # type: ignore[no-untyped-call]
+        pixels: NDArray[np.uint8] = np.asarray(self._canvas.buffer_rgba())  # type: ignore[no-untyped-call]
+        return pixels[:, :, :3].copy()
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the picture, completely or not at all; the format follows from the path's suffix."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import pymunk
@@ -70,7 +71,9 @@ class ArmSpace:
         self.substep = 0
         self.clearances = np.full(len(poses), math.inf)
         self._log, self._frame, self._maze_walls, self._radius = log, frame, walls, radius
+        self.finite = True
         self._error: Exception | None = None
+        self._bodies: list[pymunk.Body] = []
         self._links: dict[pymunk.Shape, int] = {}
         self._walls: dict[pymunk.Shape, tuple[WallPiece, float]] = {}
         for k, pose in enumerate(poses):
@@ -111,26 +114,26 @@ class ArmSpace:
         shape = pymunk.Segment(body, (-half, 0.0), (half, 0.0), self._radius + TOLERANCE)
         shape.collision_type, shape.filter = LINK, IN_FEEDER
         self.space.add(body, shape)
+        self._bodies.append(body)
         self._links[shape] = k
 
     def _add_joints(self) -> None:
-        bodies = [shape.body for shape in self._links]
+        bodies = self._bodies
         half, reach = SIM_LINK / 2.0, (len(bodies) + 2) * SIM_LINK
         # The walls stand on the space's own static body: a joint's anchor switches off its contacts.
         rail = pymunk.Body(body_type=pymunk.Body.STATIC)
         joints: list[pymunk.Constraint] = [
-            pymunk.GrooveJoint(rail, bodies[0], (-reach, 0.0), (reach, 0.0), (end, 0.0)) for end in (-half, half)
+            pymunk.GrooveJoint(rail, bodies[0], (-reach, 0.0), (reach, 0.0), (end, 0.0))
+            for end in (-half, half)
         ]
-        joints += [
-            pymunk.PivotJoint(a, b, (half, 0.0), (-half, 0.0)) for a, b in zip(bodies, bodies[1:], strict=False)
-        ]
+        joints += [pymunk.PivotJoint(a, b, (half, 0.0), (-half, 0.0)) for a, b in pairwise(bodies)]
         for joint in joints:
             joint.error_bias, joint.collide_bodies = 0.0, False
         self.space.add(rail, *joints)
 
     def _add_wall(self, piece: WallPiece) -> None:
-        # No `set_neighbors`: it drops contacts at the ends of walls (measured: of 18,771 links across the walls
-        # of fig19, 1,427 went unnoticed with it, and none without).
+        # No `set_neighbors`: it drops contacts at the ends of walls (measured: of 18,771 links at or across
+        # the walls of fig19, 1,427 went unnoticed with it, and none without).
         # What is solid behind the surface begins two tolerances below it, and so is touched by a collision
         # alone: a pinch is seen once.
         radius = max(piece.radius - 2.0 * TOLERANCE, 0.0)
@@ -171,7 +174,7 @@ class ArmSpace:
         link_shape, wall_shape = arbiter.shapes
         link, (piece, margin) = self._links[link_shape], self._walls[wall_shape]
         contacts = arbiter.contact_point_set
-        point, distance = _deepest(contacts, from_base_on=link < self.n_held)
+        point, distance = self._deepest(contacts, from_base_on=link < self.n_held)
         if point is None:
             return math.inf
         clearance = distance + margin
@@ -187,7 +190,7 @@ class ArmSpace:
     def _see_link(self, arbiter: pymunk.Arbiter, *, impulse: float = 0.0) -> float:
         """Record a contact between links; return its clearance in simulator units."""
         a, b = sorted(self._links[shape] for shape in arbiter.shapes)
-        point, distance = _deepest(arbiter.contact_point_set, from_base_on=a < self.n_held)
+        point, distance = self._deepest(arbiter.contact_point_set, from_base_on=a < self.n_held)
         clearance = distance + 2.0 * TOLERANCE
         if point is None or clearance > TOLERANCE:
             return math.inf
@@ -201,6 +204,19 @@ class ArmSpace:
             key, self.substep, wall, self._frame.place_in_maze(point), clearance / self._frame.scale, impulse
         )
 
+    def _deepest(self, contacts: pymunk.ContactPointSet, *, from_base_on: bool) -> tuple[Place | None, float]:
+        """Return the deepest point of a contact, on the second shape, and its distance.
+
+        Of a link that is still in the feeder only what lies in front of the base is in the maze.
+        """
+        place, deepest = None, math.inf
+        for contact in contacts.points:
+            point, distance = contact.point_b, contact.distance
+            self.finite = self.finite and math.isfinite(distance)
+            if distance < deepest and (not from_base_on or point[0] >= 0.0):
+                place, deepest = (point[0], point[1]), distance
+        return place, deepest
+
     def _corner(self, piece: WallPiece, point: Place) -> tuple[Place | None, bool]:
         """Return the corner at a point of the surface, and whether the point is away from its wall's ends."""
         for end, juts, index in ((piece.start, piece.start_juts, 0), (piece.end, piece.end_juts, 1)):
@@ -211,22 +227,9 @@ class ArmSpace:
 
 
 def _link_filter(k: int) -> pymunk.ShapeFilter:
-    """Let a link meet walls and all links but its neighbours (and, at 30 categories, those 29 or 31 apart)."""
+    """Let a link meet walls and all links but its neighbours (and, with 30 bits, those 29 or 31 off)."""
     neighbours = 1 << ((k - 1) % N_CATEGORIES) | 1 << ((k + 1) % N_CATEGORIES)
     return pymunk.ShapeFilter(categories=1 << (k % N_CATEGORIES), mask=EVERYTHING & ~neighbours)
-
-
-def _deepest(contacts: pymunk.ContactPointSet, *, from_base_on: bool) -> tuple[Place | None, float]:
-    """Return the deepest point of a contact, on the second shape, and its distance.
-
-    Of a link that is still in the feeder only what lies in front of the base is in the maze.
-    """
-    place, deepest = None, math.inf
-    for contact in contacts.points:
-        point = contact.point_b
-        if contact.distance < deepest and (not from_base_on or point[0] >= 0.0):
-            place, deepest = (point[0], point[1]), contact.distance
-    return place, deepest
 
 
 def _is_behind(piece: WallPiece, normal: tuple[float, float]) -> bool:

@@ -1,4 +1,4 @@
-"""The task: reach the goal with the tip, and collide with nothing. Pure functions of the simulator's readings."""
+"""The task: reach the goal with the tip, and collide with nothing. Pure functions of the simulator."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ JOINT_STEP = 0.05
 """Largest change of a joint's target in one step, in rad."""
 
 LARGEST_STEP = 0.05
-"""Largest movement of any joint's place in one step, in link lengths: many joints together move the tip far."""
+"""Largest movement of any joint's place in one step, in link lengths: many joints together move a tip far."""
 
 GOAL_BONUS = 10.0
 COLLISION_PENALTY = 1.0
@@ -98,7 +98,8 @@ def observation(physics: Physics, target: FloatArray, goal_distance: float) -> N
             physics.clearance / length,
         ]
     )
-    return np.clip(values, -1.0, 1.0).astype(np.float32)
+    seen: NDArray[np.float32] = np.clip(values, -1.0, 1.0).astype(np.float32)
+    return seen
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,9 @@ from hrsnake_env.maze import Maze
 __all__ = ["Frame", "WallPiece", "wall_pieces"]
 
 CORE_RADII = (0.02, 0.01, 0.005)
-"""Radii of the solid layer, in link lengths; the smaller ones stand only in walls too thin for the larger. The
-depth of a link that lies wholly behind the surface is exact up to this, and beyond it a lower bound."""
+"""Radii of the solid layer, in link lengths; the smaller ones stand only in walls too thin for the larger.
+
+The depth of a link that lies wholly behind the surface is exact up to this, and beyond it a lower bound."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,7 +109,7 @@ def wall_pieces(maze: Maze, frame: Frame, link_length: float, slot: float, reach
         surface += _surface_pieces(ring[:-1], first_wall, _slot(slot, reach))
         first_wall += len(ring) - 1
     free_space = Polygon(rings[0], rings[1:])
-    edges = shapely.linestrings([np.stack([a, b]) for ring in rings for a, b in zip(ring, ring[1:], strict=False)])
+    edges = shapely.linestrings([np.stack([a, b]) for ring in rings for a, b in pairwise(ring)])
     return surface + _core_pieces(free_space, shapely.STRtree(edges), link_length, slot, reach)
 
 

@@ -43,7 +43,7 @@ def last_angle(angle):
 
 
 def swing(to, feed, n_poses=60):
-    """The tip link turns, at a fixed feed, from straight to an angle."""
+    """Turn the tip link, at a fixed feed, from straight to an angle."""
     angles = np.zeros((n_poses, N_LINKS))
     angles[:, -1] = np.linspace(0.0, to, n_poses)
     return np.full(n_poses, feed), angles

@@ -1,0 +1,384 @@
+"""Contracts of the environment: Gymnasium's, stable-baselines3's and its own documentation's."""
+
+import math
+import re
+import subprocess
+import sys
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import hrsnake_env
+from hrsnake_env import ArmSpec, InputError, Maze
+from hrsnake_env.arm import feeder_angle_limits
+from hrsnake_env.env import HyperRedundantMazeEnv
+from hrsnake_env.rendering import MazePicture
+from hrsnake_env.task import (
+    COLLISION_PENALTY,
+    FEED_STEP,
+    GOAL_BONUS,
+    JOINT_STEP,
+    LARGEST_STEP,
+    observation_parts,
+)
+
+ID = "HyperRedundantMaze-v0"
+SHORT = Maze.from_corridors([(0, 0), (0, 900)], 300.0, name="short", goal=(0.0, 450.0), goal_radius=40.0)
+"""A straight corridor: feeding alone reaches the goal."""
+
+
+def make(**arguments):
+    return gym.make(ID, **{"maze": "fig19", "link_length": 430.0, **arguments})
+
+
+def feeding(env, amount=1.0):
+    action = np.zeros(env.action_space.shape)
+    action[0] = amount
+    return action
+
+
+# The contracts of others
+
+
+@pytest.mark.parametrize(
+    "arguments", [{}, {"render_mode": "rgb_array"}, {"n_links": 1}, {"link_radius": 10.0}]
+)
+def test_gymnasium_finds_nothing_to_warn_of(arguments):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(make(**arguments).unwrapped)
+
+
+def test_stable_baselines3_finds_nothing_to_warn_of():
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        checker.check_env(make(render_mode="rgb_array").unwrapped)
+
+
+def test_the_world_registers_itself_once_and_without_the_simulator():
+    code = (
+        "import sys, warnings; warnings.simplefilter('error')\n"
+        "import hrsnake_env, importlib\n"
+        "assert 'pymunk' not in sys.modules\n"
+        "importlib.reload(hrsnake_env)\n"
+        "import gymnasium\n"
+        f"assert gymnasium.spec({ID!r}).max_episode_steps == 10_000\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+    code = f"import gymnasium; gymnasium.make('hrsnake_env:{ID}').reset()"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_all_names_of_the_package_are_there():
+    assert all(hasattr(hrsnake_env, name) for name in hrsnake_env.__all__)
+
+
+# Episodes
+
+
+def test_a_random_policy_meets_no_nan_and_stays_in_the_spaces():
+    env = make(terminate_on_collision=False)
+    env.action_space.seed(3)
+    observation, info = env.reset(seed=3)
+    keys, seen, ends = list(info), [], 0
+    for _ in range(4000):
+        action = env.action_space.sample()
+        action[0] = abs(action[0])
+        observation, reward, terminated, truncated, info = env.step(action)
+        seen.append(observation)
+        assert env.observation_space.contains(observation)
+        assert math.isfinite(reward)
+        assert all(math.isfinite(value) for value in info.values())
+        assert list(info) == keys
+        if terminated or truncated:
+            ends += 1
+            env.reset()
+    assert ends > 0
+    n = env.unwrapped.physics.n_links
+    constant = np.flatnonzero(np.ptp(seen, axis=0) == 0.0)
+    # Only links that have never left the feeder have nothing to tell: the rear one cannot.
+    names = np.concatenate([np.full(length, name) for name, (length, _) in observation_parts(n).items()])
+    assert set(names[constant]) <= {"joint_angles", "target_errors", "speeds", "clearances"}
+
+
+def test_info_has_the_same_keys_and_kinds_from_the_reset_on():
+    env = make()
+    _, first = env.reset()
+    *_, second = env.step(feeding(env))
+    assert {key: type(value) for key, value in first.items()} == {key: type(v) for key, v in second.items()}
+    terms = [value for key, value in first.items() if key.startswith("reward_")]
+    assert terms == [0.0, 0.0, 0.0]
+
+
+def test_two_rollouts_with_the_same_actions_are_equal():
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-1.0, 1.0, (300, 8))
+    actions[:, 0] = np.abs(actions[:, 0])
+    rollouts = []
+    env = make(terminate_on_collision=False, n_links=7)
+    for _ in range(2):
+        observation, _ = env.reset(seed=1)
+        trace = [observation]
+        for action in actions:
+            observation, reward, terminated, _, info = env.step(action)
+            trace.append(np.append(observation, [reward, info["clearance"], info["impulse"]]))
+            if terminated:
+                break
+        rollouts.append(trace)
+    for step, (a, b) in enumerate(zip(*rollouts, strict=True)):
+        assert np.array_equal(a, b), step
+
+
+def test_observations_share_no_memory():
+    env = make()
+    first, _ = env.reset()
+    kept = first.copy()
+    env.step(feeding(env))
+    assert np.array_equal(first, kept)
+
+
+def test_the_goal_ends_the_episode_as_a_success():
+    env = gym.make(ID, maze=SHORT, link_length=200.0)
+    env.reset()
+    terminated, total = False, 0.0
+    while not terminated:
+        _, reward, terminated, truncated, info = env.step(feeding(env))
+        total += reward
+        assert reward == pytest.approx(sum(v for key, v in info.items() if key.startswith("reward_")))
+        assert not truncated
+    assert info["success"] and info["is_success"]
+    assert info["tip_distance"] <= SHORT.goal_radius
+    assert info["reward_goal"] == GOAL_BONUS
+    # The tip has come 445 - 40 nearer, of which a link is 200.
+    assert total == pytest.approx(GOAL_BONUS + (445.0 - 40.0) / 200.0, abs=0.1)
+    assert env.unwrapped.pinch_report().clean
+
+
+@pytest.mark.parametrize("ends", [True, False])
+def test_a_collision_ends_the_episode_if_it_shall(ends):
+    env = make(terminate_on_collision=ends)
+    env.reset(options={"feed": 900.0})
+    action = feeding(env, 0.0)
+    action[-1] = 1.0
+    info = {"collisions": 0}
+    while info["collisions"] == 0:
+        _, _, terminated, _, info = env.step(action)
+    assert terminated is ends
+    assert info["collisions"] == 1
+    assert info["depth"] > 0.001 * 430.0
+    assert not info["success"]
+    assert info["reward_collision"] == -COLLISION_PENALTY
+    report = env.unwrapped.pinch_report()
+    assert report.first_collision.link == env.unwrapped.physics.n_links - 1
+    assert not report.clean
+
+
+def test_an_arm_pushed_on_into_a_wall_jams():
+    env = make(terminate_on_collision=False)
+    env.reset(options={"feed": 1500.0})
+    for _ in range(200):  # the end of the leg is 95 away
+        *_, terminated, _, info = env.step(feeding(env))
+        if terminated:
+            break
+    assert terminated
+    assert info["node_error"] > 0.05 * 430.0 or info["drift"] > 0.01 * 430.0
+    assert not info["success"]
+
+
+def test_the_time_limit_truncates():
+    env = gym.make(ID, max_episode_steps=3)
+    env.reset()
+    assert [env.step(feeding(env, 0.1))[3] for _ in range(3)] == [False, False, True]
+
+
+# Actions
+
+
+def test_an_action_changes_the_targets_by_the_step_limits():
+    env = make().unwrapped
+    env.reset(options={"feed": 900.0})
+    action = np.zeros(env.action_space.shape)
+    action[0], action[-1] = 0.25, -0.5
+    env.step(action)
+    expected = np.zeros(env.action_space.shape)
+    expected[0], expected[-1] = 900.0 + 0.25 * FEED_STEP * 430.0, -0.5 * JOINT_STEP
+    np.testing.assert_allclose(env.target, expected, atol=1e-9)
+    env.step(10.0 * action)  # cut to [-1, 1]
+    expected[0] += FEED_STEP * 430.0
+    moved = math.hypot(0.02, 0.05) + 0.02  # more than the largest step: all of it is scaled down
+    assert moved > LARGEST_STEP
+    share = (env.target[-1] - expected[-1]) / -JOINT_STEP
+    assert 0.5 < share < 1.0
+    assert env.target[0] == pytest.approx(expected[0] - (1 - share) * FEED_STEP * 430.0, abs=1e-6)
+
+
+def test_a_float64_action_keeps_its_digits():
+    env = make().unwrapped
+    env.reset(options={"feed": 900.0})
+    action = np.zeros(env.action_space.shape)
+    action[-1] = 1.0 / 3.0
+    env.step(action)
+    assert env.target[-1] == pytest.approx(JOINT_STEP / 3.0, rel=1e-14)
+
+
+def test_no_joint_moves_farther_in_a_step_than_the_largest_step():
+    env = make(terminate_on_collision=False).unwrapped
+    rng = np.random.default_rng(1)
+    env.reset(options={"feed": 1300.0})
+    before = env.physics.target_joints
+    for _ in range(100):
+        _, _, terminated, _, _ = env.step(rng.choice([-1.0, 1.0], env.action_space.shape))
+        after = env.physics.target_joints
+        assert np.linalg.norm(after - before, axis=1).max() <= LARGEST_STEP * 430.0 * 1.001
+        limits = feeder_angle_limits(env.target[0], env.physics.n_links, 430.0)
+        assert (np.abs(env.target[1:]) <= limits + 1e-12).all()
+        before = after
+        if terminated:
+            env.reset(options={"feed": 1300.0})
+            before = env.physics.target_joints
+
+
+def test_joints_in_the_feeder_stay_straight_whatever_their_action():
+    env = make().unwrapped
+    env.reset()
+    for _ in range(20):
+        env.step(np.ones(env.action_space.shape))
+    assert env.target[0] > 0.0
+    assert (env.target[1:] == 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("action", "message"),
+    [
+        (np.zeros(7), r"Expected an action with shape (8,), got (7,)."),
+        (np.zeros((1, 8)), r"Expected an action with shape (8,), got (1, 8)."),
+        (np.array([0, 0, 0, np.nan, 0, 0, 0, 0]), r"Expected a finite action, got nan at index 3."),
+        (np.array([np.inf, 0, 0, 0, 0, 0, 0, 0]), r"Expected a finite action, got inf at index 0."),
+    ],
+)
+def test_a_bad_action_is_named(action, message):
+    env = make(n_links=7).unwrapped
+    env.reset()
+    with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
+        env.step(action)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"maze": "fig20"}, "Unknown maze 'fig20'. Available: fig19, "),
+        ({"link_length": -1.0}, "Expected a positive, finite link_length, got -1.0."),
+        ({"link_length": 1e4}, "Expected a link_length of at most the size of maze 'fig19'"),
+        ({"n_links": 0}, "Expected n_links to be a whole number of at least 1, or None, got 0."),
+        ({"substeps": 0}, "Expected substeps to be a whole number of at least 1, got 0."),
+        ({"render_mode": "ansi"}, "Unknown render_mode 'ansi'. Available: None, 'rgb_array'."),
+    ],
+)
+def test_a_bad_argument_is_named(arguments, message):
+    with pytest.raises(InputError, match=f"^{re.escape(message)}"):
+        HyperRedundantMazeEnv(**arguments)
+
+
+def test_an_unknown_reset_option_is_named():
+    with pytest.raises(InputError, match=r"^Unknown reset option 'pose'\. Available: feed, joint_angles\.$"):
+        make().unwrapped.reset(options={"pose": 1})
+
+
+# What the documentation says
+
+
+def test_the_table_of_the_docstring_is_the_observation_space():
+    rows = re.findall(
+        r"^ *\| (\w+) +\| ([\w +]+?) +\|.*\| (-?\d) +\| (\d) +\|$", HyperRedundantMazeEnv.__doc__, re.M
+    )
+    n = 5
+    documented = {name: (eval(number, {"n_links": n}), float(low)) for name, number, low, _ in rows}
+    assert documented == observation_parts(n)
+    env = make(n_links=n)
+    low = np.concatenate([np.full(length, bound) for length, bound in documented.values()])
+    assert env.observation_space.shape == (4 * n + 8,)
+    assert np.array_equal(env.observation_space.low, low)
+    assert np.array_equal(env.observation_space.high, np.ones(4 * n + 8))
+    assert env.action_space.shape == (n + 1,)
+
+
+def test_the_docstring_states_the_constants():
+    text = HyperRedundantMazeEnv.__doc__
+    for value in (FEED_STEP, JOINT_STEP, LARGEST_STEP):
+        assert f"{value:g}" in text
+    assert f"`reward_goal`, {GOAL_BONUS:g} on success" in text
+    assert f"`reward_collision`, {-COLLISION_PENALTY:g} in a step" in text
+
+
+def test_an_observation_holds_what_its_parts_are_called():
+    env = make().unwrapped
+    angles = np.zeros(env.physics.n_links)
+    angles[-1] = 0.1
+    observation, info = env.reset(options={"feed": 900.0, "joint_angles": angles})
+    parts, start = {}, 0
+    for name, (length, _) in observation_parts(env.physics.n_links).items():
+        parts[name] = observation[start : start + length]
+        start += length
+    physics, maze = env.physics, env.maze
+    assert parts["feed"][0] == pytest.approx(900.0 / (physics.n_links * 430.0))
+    assert parts["joint_angles"][-1] == pytest.approx(0.1 / math.pi, rel=1e-5)
+    np.testing.assert_allclose(parts["goal_offset"] * maze.size, maze.goal - physics.tip_position, rtol=1e-5)
+    heading = math.pi / 2 + 0.1
+    np.testing.assert_allclose(parts["tip_heading"], [math.cos(heading), math.sin(heading)], rtol=1e-5)
+    np.testing.assert_allclose(parts["clearances"], physics.clearance / 430.0, rtol=1e-5)
+    assert 0.0 < parts["goal_distance"][0] < 0.5
+    assert info["feed"] == pytest.approx(900.0)
+
+
+def test_the_default_arm_fits_its_maze_and_reaches_the_goal():
+    for name in ("fig19", "spiral", "stairs"):
+        env = HyperRedundantMazeEnv(maze=name)
+        assert isinstance(env.arm, ArmSpec)
+        assert env.arm.n_links * env.arm.link_length > np.linalg.norm(env.maze.goal - env.maze.base_pose[:2])
+    assert HyperRedundantMazeEnv(maze="fig19", link_length=430.0).arm.n_links == 7
+
+
+# Pictures
+
+
+@pytest.mark.image
+def test_a_picture_changes_with_the_pose_and_shows_what_touches():
+    env = make(render_mode="rgb_array")
+    env.reset(options={"feed": 900.0})
+    first = env.render()
+    assert first.dtype == np.uint8
+    assert first.ndim == 3
+    assert first.shape[2] == 3
+    assert np.array_equal(first, env.render())
+    action = feeding(env, 0.0)
+    action[-1] = 1.0
+    for _ in range(6):
+        if env.step(action)[2]:
+            break
+    second = env.render()
+    red = (second[..., 0] > 180) & (second[..., 1] < 80) & (second[..., 2] < 80)
+    assert red.any()
+    assert not ((first[..., 0] > 180) & (first[..., 1] < 80) & (first[..., 2] < 80)).any()
+
+
+def test_rendering_without_a_mode_warns_and_returns_nothing():
+    env = make().unwrapped
+    env.reset()
+    with pytest.warns(UserWarning, match="without a render mode"):
+        assert env.render() is None
+
+
+@pytest.mark.image
+def test_a_picture_is_written_as_png_or_svg(tmp_path):
+    picture = MazePicture(SHORT, title="short")
+    picture.draw_arm(np.array([[0.0, -100.0], [0.0, 100.0], [50.0, 290.0]]), pinched=[1])
+    picture.add_arm(np.array([[0.0, -100.0], [0.0, 100.0]]), colour="black", alpha=0.3)
+    for suffix in ("png", "svg"):
+        path = tmp_path / f"picture.{suffix}"
+        picture.save(path)
+        assert path.stat().st_size > 1000
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["picture.png", "picture.svg"]
