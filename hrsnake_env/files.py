@@ -14,7 +14,7 @@ __all__ = ["replacing"]
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a path beside `path` to write to; it takes the place of `path` when the block ends well.
 
-    If the block is left by an exception, Ctrl-C included, `path` stays as it was and nothing is left beside it.
+    If the block is left by an exception, Ctrl-C included, `path` stays as it was, with nothing beside it.
     """
     target = Path(path)
     part = target.with_name(f"{target.stem}.part{target.suffix}")  # libraries tell the format by the ending

@@ -235,7 +235,7 @@ class ValidationReport:
     Parameters
     ----------
     faults : tuple of Fault
-        At most one of each kind: the worst. Empty means valid.
+        At most one of each kind: the worst (of crossings: the first). Empty means valid.
     clearance : float
         Smallest signed distance of any link to the walls over all poses, in maze units; negative is the
         penetration depth.

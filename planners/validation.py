@@ -84,8 +84,8 @@ def validate(
     Returns
     -------
     report : ValidationReport
-        With at most one fault of each kind, the worst. A fault's `amount` is the figure that was too large
-        (for a crossing: the distance that was too small).
+        With at most one fault of each kind, the worst (of crossings, the first). A fault's `amount` is the
+        figure that was too large (for a crossing: the distance that was too small).
 
     Raises
     ------

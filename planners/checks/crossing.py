@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import shapely
@@ -37,13 +36,13 @@ def check_crossing(scene: Scene, tell: Progress) -> Fault | None:
         message = f"Link {joint + 1} lies folded back on link {joint} at pose {pose}."
         return joint_fault(scene, "crossing", message, pose, joint + 1, 0.0)
     n_intervals = max(1, scene.motion.n_poses - 1)
-    worst: tuple[float, int, int, int, float] | None = None
     for first in range(0, n_intervals, CHUNK):
         pairs = _near_pairs(scene, np.arange(first, min(first + CHUNK, n_intervals)))
-        for found in _meetings(scene, *pairs):
-            worst = found if worst is None or found[0] < worst[0] else worst
+        found = _first_meeting(scene, *pairs)
+        if found is not None:
+            return _crossing_fault(scene, *found)
         tell("validate", 0.8 + 0.2 * min(1.0, (first + CHUNK) / n_intervals))
-    return None if worst is None else _crossing_fault(scene, *worst)
+    return None
 
 
 def _near_pairs(scene: Scene, interval: IntArray) -> tuple[IntArray, IntArray, IntArray]:
@@ -62,14 +61,17 @@ def _near_pairs(scene: Scene, interval: IntArray) -> tuple[IntArray, IntArray, I
     return interval[row], first[pair], second[pair]
 
 
-def _meetings(
+def _first_meeting(
     scene: Scene, interval: IntArray, first: IntArray, second: IntArray
-) -> Iterator[tuple[float, int, int, int, float]]:
-    """Yield where pairs of links meet, or may: distance, interval, both links, time in the interval."""
+) -> tuple[float, int, int, int, float] | None:
+    """Find where pairs of links meet, or may: distance, interval, both links, time in the interval.
+
+    Of those found after equally many halvings the nearest is returned; the rest is not looked at.
+    """
     time, allowed = np.tile((0.0, 1.0), (len(interval), 1)), 2.0 * scene.radius
     for level in range(MAX_SPLITS + 1):
         if not len(interval):
-            return
+            return None
         least = np.zeros(len(interval))
         lines = []
         for link in (first, second):
@@ -86,7 +88,7 @@ def _meetings(
         named = meet | rest if level == MAX_SPLITS else meet
         if named.any():
             row, side = (int(k) for k in np.argwhere(apart == apart[named].min())[0])
-            yield (
+            return (
                 float(apart[row, side]),
                 int(interval[row]),
                 int(first[row]),
@@ -95,6 +97,7 @@ def _meetings(
             )
         time = halves(time[rest]).reshape(-1, 2)
         interval, first, second = (np.repeat(values[rest], 2) for values in (interval, first, second))
+    return None
 
 
 def _crossing_fault(scene: Scene, distance: float, pose: int, first: int, second: int, time: float) -> Fault:
