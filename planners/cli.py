@@ -18,7 +18,7 @@ import typer
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
-from hrsnake_env.maze import Maze
+from hrsnake_env.maze import MAZES, Maze
 from planners import tables
 from planners.planning import PLANNERS, plan
 from planners.problem import Motion, PlanningResult, Progress
@@ -41,7 +41,9 @@ UsageError: type[Exception] = next(
     cls for cls in typer.BadParameter.__mro__ if cls.__name__ == "ClickException"
 )
 
-MazeArgument = Annotated[str, typer.Argument(metavar="MAZE", help="A named maze, or a .geojson file.")]
+MazeArgument = Annotated[
+    str, typer.Argument(metavar="MAZE", help=f"A .geojson file, or one of: {', '.join(MAZES)}.")
+]
 MotionArgument = Annotated[Path, typer.Argument(metavar="MOTION", help="A motion (.npz).")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")]
 RadiusOption = Annotated[float, typer.Option("--link-radius", help="Radius of the links, in maze units.")]
