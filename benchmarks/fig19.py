@@ -19,6 +19,7 @@ import numpy as np
 from rich.progress import track
 
 from hrsnake_env.arm import ArmSpec
+from hrsnake_env.contacts import Touch
 from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import corridor_family, fig19
@@ -76,13 +77,14 @@ def verdict_row(motion: Motion, maze: Maze, inward: float) -> dict[str, Any]:
         "node_error_px": report.node_error,
         "drift_px": report.drift,
         "first_collision": None if exact.first_collision is None else exact.first_collision.to_dict(),
-        "corners": {
-            f"corner ({touch.corner[0]:g}, {touch.corner[1]:g})": -touch.clearance
-            for touch in (*exact.pinched_corners, *exact.collisions)
-            if touch.corner is not None
-        },
-        "walls": {touch.wall: -touch.clearance for touch in exact.collisions if touch.corner is None},
+        "collided_depth_px": {where(maze, touch): -touch.clearance for touch in exact.collisions},
     }
+
+
+def where(maze: Maze, touch: Touch) -> str:
+    """Name a corner by its place, a wall by its middle."""
+    x, y = maze.walls[touch.wall].mean(axis=0) if touch.corner is None else touch.corner
+    return f"{'wall' if touch.corner is None else 'corner'} ({x:g}, {y:g})"
 
 
 def fingerprint() -> str:
@@ -132,11 +134,10 @@ def print_tables(results: dict[str, Any]) -> None:
         for row in rows:
             counts = f"{row['free']}, {row['pinch']}, {row['collision']}"
             verdict = "clean" if row["clean"] else "not clean"
-            places = {**{f"wall {number}": depth for number, depth in row["walls"].items()}, **row["corners"]}
-            where = "; ".join(f"{place}: {depth:.2f}" for place, depth in places.items()) or "-"
+            places = "; ".join(f"{place}: {depth:.2f}" for place, depth in row["collided_depth_px"].items())
             print(
                 f"| {row['walls_inward_px']:g} px | {verdict} | {counts} "
-                f"| {row['kinematic_depth_px']:.2f} px | {where} |"
+                f"| {row['kinematic_depth_px']:.2f} px | {places or '-'} |"
             )
     same = len(set(results["fingerprints"])) == 1
     print(

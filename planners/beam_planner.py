@@ -137,6 +137,8 @@ def plan_beam(maze: Maze, arm: ArmSpec, progress: Progress | None = None) -> Can
     clock = [time.perf_counter()]
     feeds, headings, failure = _sweep(geometry, arm)
     clock.append(time.perf_counter())
+    if progress is not None:
+        progress("plan", 1.0)
     if failure is not None:
         ending, link, place = failure
         return Candidate(
