@@ -96,6 +96,10 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         Simulated steps in one step of the environment.
     torque_limit : float, optional
         Largest joint torque in link mass x link length^2 / s^2; None means no limit. A step takes 0.05 s.
+    actuation : {"computed_torque", "gear"}
+        "gear": a servo in each joint turns its link to the target, and nothing else pushes the links. Walls
+        then hardly push back: a link sinks into a wall by about 90 % of what it is sent. Use it to see what
+        joint servos alone do; `torque_limit` must be None.
     terminate_on_collision : bool
         Whether a collision ends the episode.
     render_mode : {None, "rgb_array"}
@@ -124,6 +128,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         link_radius: float = 0.0,
         substeps: int = 4,
         torque_limit: float | None = None,
+        actuation: str = "computed_torque",
         terminate_on_collision: bool = True,
         render_mode: str | None = None,
     ) -> None:
@@ -140,7 +145,9 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             # A link more than a way 5 % longer takes: links cut corners less well than a string.
             n_links = math.ceil(1.05 * self._way / link_length) + 1
         self.arm = ArmSpec(link_length=link_length, n_links=n_links, link_radius=link_radius)
-        self.physics = Physics(self.maze, self.arm, substeps=substeps, torque_limit=torque_limit)
+        self.physics = Physics(
+            self.maze, self.arm, substeps=substeps, torque_limit=torque_limit, actuation=actuation
+        )
         self.render_mode = render_mode
         self.action_space = spaces.Box(-1.0, 1.0, (n_links + 1,), np.float32)
         self.observation_space = task.observation_space(n_links)

@@ -1,4 +1,4 @@
-"""The simulator: rigid links in pymunk, driven by computed torque, among walls of exact shape."""
+"""The simulator: rigid links in pymunk, driven by computed torque or gears, among walls of exact shape."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pymunk
 import pymunk.batch
 from numpy.typing import ArrayLike
 
+from hrsnake_env.actuation import ACTUATIONS, aim_gears, placed_chain
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.contacts import PINCH_TOLERANCE, Contact, ContactLog, PinchReport, pinch_report
 from hrsnake_env.dynamics import (
@@ -71,6 +72,11 @@ class Physics:
     torque_limit : float, optional
         Each joint torque is cut to it, in link mass x link length^2 / s^2; the arm then falls behind where
         it is too weak. None means no limit. Joints in the feeder are held by the feeder.
+    actuation : {"computed_torque", "gear"}
+        "gear": a servo in each joint turns its link to the target, and no force pushes the links. This needs
+        links that get lighter from base to tip and are hard to turn, so torques and forces mean nothing (they
+        read 0), impulses are in masses of the touched link, and walls lose: a link sinks into a wall by
+        about 90 % of what it is sent. Use it to see what joint servos alone do. Unused if `kinematic`.
 
     Raises
     ------
@@ -86,6 +92,7 @@ class Physics:
         substeps: int = 4,
         kinematic: bool = False,
         torque_limit: float | None = None,
+        actuation: str = "computed_torque",
     ) -> None:
         if arm.n_links is None:
             raise InputError("Expected an arm with a number of links (n_links), got None.")
@@ -93,7 +100,12 @@ class Physics:
             raise InputError(f"Expected substeps to be a whole number of at least 1, got {substeps!r}.")
         if torque_limit is not None and not torque_limit > 0.0:
             raise InputError(f"Expected a positive torque_limit, or None, got {torque_limit!r}.")
+        if actuation not in tuple(ACTUATIONS):
+            raise InputError(f"Unknown actuation {actuation!r}. Available: 'computed_torque', 'gear'.")
+        if actuation == "gear" and torque_limit is not None:
+            raise InputError(f"Expected no torque_limit with actuation 'gear', got {torque_limit!r}.")
         self.maze, self.arm, self.substeps, self.kinematic = maze, arm, int(substeps), kinematic
+        self._actuation = actuation
         self.n_links, self.link_length = int(arm.n_links), arm.link_length
         self._torque_limit = math.inf if torque_limit is None else float(torque_limit) * SIM_LINK**2
         x, y, heading = (float(value) for value in maze.base_pose)
@@ -147,11 +159,13 @@ class Physics:
         self._worst_node_error = self._worst_drift = self._feed_force = 0.0
         place_links(self._target, SIM_LINK, self._poses, self._nodes)
         self._last_nodes[:] = self._nodes
+        build = placed_chain if self.kinematic else ACTUATIONS[self._actuation]
+        self._chain = build(self.n_links, SIM_LINK)
         self._space = ArmSpace(
             self._pieces,
+            self._chain,
             self._poses,
             self._radius,
-            kinematic=self.kinematic,
             log=self._log,
             frame=self._frame,
             walls=self.maze.walls,
@@ -207,12 +221,14 @@ class Physics:
         timestep = CONTROL_TIMESTEP / self.substeps
         if self.kinematic:
             pymunk.batch.set_space_bodies(self._space.space, POSES, self._writer)
+        elif self._actuation == "gear":
+            aim_gears(self._chain, self._last_target, target, SIM_LINK, timestep)
         else:
             self._compute_forces(target, timestep)
-            self._last_target[:] = target
             self._effort += (self._feed_force, *self._torques)
             self._n_efforts += 1
             pymunk.batch.set_space_bodies(self._space.space, FORCES, self._writer)
+        self._last_target[:] = target
         self._space.step(timestep)
         self._read()
 
@@ -339,13 +355,13 @@ class Physics:
     def torques(self) -> FloatArray:
         """Mean joint torques within the last pose, shape (n_links,), in link mass x link length^2 / s^2.
 
-        0 for joints in the feeder.
+        0 for joints in the feeder, and on gears.
         """
         return self._effort[1:] / (max(self._n_efforts, 1) * SIM_LINK**2)
 
     @property
     def feed_force(self) -> float:
-        """Mean force along the feeder within the last pose, in link mass x link length / s^2."""
+        """Mean force along the feeder within the last pose, in link mass x link length / s^2; 0 on gears."""
         return float(self._effort[0]) / (max(self._n_efforts, 1) * SIM_LINK)
 
     @property
@@ -415,6 +431,7 @@ def simulate(
     substeps: int = 4,
     kinematic: bool = False,
     torque_limit: float | None = None,
+    actuation: str = "computed_torque",
 ) -> PinchReport:
     """Run the poses of a motion through the simulator, and say whether links merely pinched the walls.
 
@@ -428,7 +445,7 @@ def simulate(
         In maze units.
     joint_angles : array-like, shape (n_poses, n_links)
         In rad.
-    substeps, torque_limit
+    substeps, torque_limit, actuation
         As `Physics` has them.
     kinematic : bool
         Run the exact pass alone. By default the report is of the dynamic run, and holds the exact pass.
@@ -444,7 +461,14 @@ def simulate(
             f"got {feeds.shape} and {angles.shape}."
         )
     arm = dataclasses.replace(arm, n_links=angles.shape[1])
-    physics = Physics(maze, arm, substeps=substeps, kinematic=kinematic, torque_limit=torque_limit)
+    physics = Physics(
+        maze,
+        arm,
+        substeps=substeps,
+        kinematic=kinematic,
+        torque_limit=torque_limit,
+        actuation=actuation,
+    )
     physics.reset(feeds[0], angles[0])
     for k in range(1, len(feeds)):
         physics.advance(feeds[k], angles[k])

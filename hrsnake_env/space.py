@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 import pymunk
 
+from hrsnake_env.actuation import Chain
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.contacts import PINCH_TOLERANCE, ContactKey, ContactLog, Place
 from hrsnake_env.walls import Frame, WallPiece
@@ -19,7 +19,6 @@ SIM_LINK = 230.0
 """Length of a link in simulator units, whatever the maze's: pymunk's tolerances then always mean the same."""
 
 TOLERANCE = PINCH_TOLERANCE * SIM_LINK
-ITERATIONS = 10
 LINK, WALL = 1, 2
 WALL_CATEGORY = 1 << 31
 N_CATEGORIES = 30
@@ -37,12 +36,12 @@ class ArmSpace:
     ----------
     pieces : sequence of WallPiece
         The walls, in simulator units.
+    chain : Chain
+        The arm's links and joints.
     poses : array, shape (n_links, 3)
         Centre and heading of each link, in simulator units and rad.
     radius : float
         Of the links, in simulator units.
-    kinematic : bool
-        Whether links go where they are put, whatever is in the way.
     log : ContactLog
         Where contacts are recorded.
     frame : Frame
@@ -54,16 +53,16 @@ class ArmSpace:
     def __init__(
         self,
         pieces: Sequence[WallPiece],
+        chain: Chain,
         poses: FloatArray,
         radius: float,
         *,
-        kinematic: bool,
         log: ContactLog,
         frame: Frame,
         walls: FloatArray,
     ) -> None:
         self.space = pymunk.Space()
-        self.space.iterations = ITERATIONS
+        self.space.iterations = chain.iterations
         # A processed contact is pushed back to the tolerance, and not beyond.
         self.space.collision_slop = 2.0 * TOLERANCE
         self.n_held = len(poses)
@@ -73,13 +72,12 @@ class ArmSpace:
         self._log, self._frame, self._maze_walls, self._radius = log, frame, walls, radius
         self.finite = True
         self._error: Exception | None = None
-        self._bodies: list[pymunk.Body] = []
+        self._masses = [link.mass for link in chain.links]
         self._links: dict[pymunk.Shape, int] = {}
         self._walls: dict[pymunk.Shape, tuple[WallPiece, float]] = {}
         for k, pose in enumerate(poses):
-            self._add_link(k, pose, kinematic)
-        if not kinematic:
-            self._add_joints()
+            self._add_link(k, chain.links[k], pose)
+        self.space.add(*chain.rest)
         for piece in pieces:
             self._add_wall(piece)
         self.space.on_collision(LINK, WALL, pre_solve=self._before_wall, post_solve=self._after_wall)
@@ -104,32 +102,13 @@ class ArmSpace:
 
     # Building
 
-    def _add_link(self, k: int, pose: FloatArray, kinematic: bool) -> None:
-        if kinematic:
-            body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
-        else:
-            body = pymunk.Body(1.0, SIM_LINK**2 / 12.0)
+    def _add_link(self, k: int, body: pymunk.Body, pose: FloatArray) -> None:
         body.position, body.angle = (float(pose[0]), float(pose[1])), float(pose[2])
         half = SIM_LINK / 2.0
         shape = pymunk.Segment(body, (-half, 0.0), (half, 0.0), self._radius + TOLERANCE)
         shape.collision_type, shape.filter = LINK, IN_FEEDER
         self.space.add(body, shape)
-        self._bodies.append(body)
         self._links[shape] = k
-
-    def _add_joints(self) -> None:
-        bodies = self._bodies
-        half, reach = SIM_LINK / 2.0, (len(bodies) + 2) * SIM_LINK
-        # The walls stand on the space's own static body: a joint's anchor switches off its contacts.
-        rail = pymunk.Body(body_type=pymunk.Body.STATIC)
-        joints: list[pymunk.Constraint] = [
-            pymunk.GrooveJoint(rail, bodies[0], (-reach, 0.0), (reach, 0.0), (end, 0.0))
-            for end in (-half, half)
-        ]
-        joints += [pymunk.PivotJoint(a, b, (half, 0.0), (-half, 0.0)) for a, b in pairwise(bodies)]
-        for joint in joints:
-            joint.error_bias, joint.collide_bodies = 0.0, False
-        self.space.add(rail, *joints)
 
     def _add_wall(self, piece: WallPiece) -> None:
         # No `set_neighbors`: it drops contacts at the ends of walls (measured: of 18,771 links at or across
@@ -200,6 +179,8 @@ class ArmSpace:
 
     def _record(self, key: ContactKey, wall: int, point: Place, clearance: float, impulse: float) -> None:
         self.clearances[key[0]] = min(self.clearances[key[0]], clearance)
+        # Of two links the outer one's mass: the first link may be immovable.
+        impulse /= self._masses[max(key[0], key[1])]
         self._log.touch(
             key, self.substep, wall, self._frame.place_in_maze(point), clearance / self._frame.scale, impulse
         )

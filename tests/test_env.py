@@ -44,7 +44,8 @@ def feeding(env, amount=1.0):
 
 
 @pytest.mark.parametrize(
-    "arguments", [{}, {"render_mode": "rgb_array"}, {"n_links": 1}, {"link_radius": 10.0}]
+    "arguments",
+    [{}, {"render_mode": "rgb_array"}, {"n_links": 1}, {"link_radius": 10.0}, {"actuation": "gear"}],
 )
 def test_gymnasium_finds_nothing_to_warn_of(arguments):
     with warnings.catch_warnings():
@@ -189,6 +190,17 @@ def test_an_arm_pushed_on_into_a_wall_jams():
     assert not info["success"]
 
 
+def test_an_arm_on_gears_goes_where_a_wall_stops_one_driven_by_computed_torque():
+    depths = {}
+    for actuation in ("computed_torque", "gear"):
+        env = make(terminate_on_collision=False, actuation=actuation)
+        env.reset(options={"feed": 900.0})
+        action = feeding(env, 0.0)
+        action[-1] = 1.0
+        depths[actuation] = [env.step(action)[-1]["depth"] for _ in range(8)][-1]
+    assert depths["gear"] > 5.0 * depths["computed_torque"] > 0.0
+
+
 def test_the_time_limit_truncates():
     env = gym.make(ID, max_episode_steps=3)
     env.reset()
@@ -275,6 +287,11 @@ def test_a_bad_action_is_named(action, message):
         ({"link_length": 1e4}, "Expected a link_length of at most the size of maze 'fig19'"),
         ({"n_links": 0}, "Expected n_links to be a whole number of at least 1, or None, got 0."),
         ({"substeps": 0}, "Expected substeps to be a whole number of at least 1, got 0."),
+        ({"actuation": "magic"}, "Unknown actuation 'magic'. Available: 'computed_torque', 'gear'."),
+        (
+            {"actuation": "gear", "torque_limit": 0.5},
+            "Expected no torque_limit with actuation 'gear', got 0.5.",
+        ),
         ({"render_mode": "ansi"}, "Unknown render_mode 'ansi'. Available: None, 'rgb_array'."),
     ],
 )

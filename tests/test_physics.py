@@ -179,6 +179,70 @@ def test_a_torque_limit_above_all_torques_changes_nothing():
     assert reports[0] == reports[1]
 
 
+# Gears
+
+
+@pytest.mark.parametrize(("n_links", "amplitude"), [(1, 0.0), (7, 0.3), (45, 0.1), (100, 0.03)])
+@pytest.mark.parametrize("substeps", [1, 4])
+def test_gears_track_a_free_motion_that_starts_abruptly(n_links, amplitude, substeps):
+    size = 260.0 * n_links + 1000.0
+    maze = Maze.from_corridors([(0, 0), (0, size)], size)
+    feed, angles = waves(600 + 20 * n_links, n_links, amplitude=amplitude)
+    report = simulate(maze, ARM, feed, angles, substeps=substeps, actuation="gear")
+    assert report.clean
+    assert report.free == report.link_poses
+    assert report.node_error < 0.0002 * LENGTH
+    assert report.drift < 0.0001 * LENGTH
+
+
+def test_gears_bring_the_arm_where_it_was_sent_and_have_no_torques():
+    feed, angles = waves()
+    physics, usual = Physics(HALL, ARM, actuation="gear"), Physics(HALL, ARM)
+    for k in range(len(feed)):
+        for each in (physics, usual):
+            each.advance(feed[k], angles[k])
+    assert not np.array_equal(physics.joints, usual.joints)
+    assert physics.feed_speed == pytest.approx(usual.feed_speed, rel=1e-3)
+    np.testing.assert_allclose(physics.joint_speeds, usual.joint_speeds, atol=1e-3)
+    assert physics.torques.tolist() == [0.0] * N_LINKS
+    assert physics.feed_force == 0.0
+    for _ in range(3):
+        physics.settle()
+    wanted = joints_from_configuration(feed[-1], angles[-1], LENGTH, HALL.base_pose)
+    np.testing.assert_allclose(physics.joints, wanted, atol=0.01)
+
+
+@pytest.mark.parametrize("beyond", [1.0, 5.0])
+def test_walls_lose_against_gears(beyond):
+    physics = Physics(fig19(), ARM, actuation="gear")
+    physics.reset(1200.0)
+    angles = np.zeros(N_LINKS)
+    for k in range(100):
+        angles[-1] = math.asin((100.0 + beyond) / LENGTH) * min(1.0, (k + 1) / 60)
+        physics.advance(1200.0, angles)
+    assert 0.8 * beyond < -physics.clearance.min() < beyond
+    report = physics.report()
+    assert not report.clean
+    assert report.largest_impulse > 0.0
+    assert {touch.wall for touch in report.collisions} == {7}
+
+
+def test_gears_repeat_themselves_to_the_last_bit():
+    physics = Physics(fig19(), ARM, actuation="gear")
+    runs = []
+    for _ in range(2):
+        physics.reset(1200.0)
+        trace = []
+        for k in range(60):
+            angles = np.zeros(N_LINKS)
+            angles[-1] = -0.015 * k  # into the wall
+            physics.advance(1200.0 + k, angles)
+            trace.append(physics.joints)
+        runs.append((np.array(trace), physics.contacts))
+    assert np.array_equal(runs[0][0], runs[1][0])
+    assert runs[0][1] == runs[1][1] != ()
+
+
 # Determinism
 
 DIGEST = """
@@ -186,10 +250,13 @@ import hashlib, numpy as np
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.mazes import fig19
 from hrsnake_env.physics import Physics
-physics = Physics(fig19(), ArmSpec(link_length=200.0, n_links=9))
+arms = [
+    Physics(fig19(), ArmSpec(link_length=200.0, n_links=9), actuation=actuation)
+    for actuation in ("computed_torque", "gear")
+]
 rng = np.random.default_rng(5)
 digest = hashlib.sha256()
-for episode in range(2):
+for physics in arms + arms:
     physics.reset()
     feed, angles = 0.0, np.zeros(9)
     for _ in range(400):
@@ -295,6 +362,16 @@ def test_targets_are_linear_between_poses_and_keep_to_the_feeder(start, end):
         ({"substeps": 0}, r"Expected substeps to be a whole number of at least 1, got 0\."),
         ({"substeps": 1.5}, r"Expected substeps to be a whole number of at least 1, got 1\.5\."),
         ({"torque_limit": -1.0}, r"Expected a positive torque_limit, or None, got -1\.0\."),
+        ({"actuation": "spring"}, r"Unknown actuation 'spring'\. Available: 'computed_torque', 'gear'\."),
+        ({"actuation": None}, r"Unknown actuation None\. Available: 'computed_torque', 'gear'\."),
+        (
+            {"actuation": "gear", "torque_limit": 2.0},
+            r"Expected no torque_limit with actuation 'gear', got 2\.0\.",
+        ),
+        (
+            {"actuation": "gear", "arm": ArmSpec(link_length=200.0, n_links=201)},
+            r"Expected at most 200 links with actuation 'gear', got 201\.",
+        ),
         ({"torque_limit": math.nan}, r"Expected a positive torque_limit, or None, got nan\."),
     ],
 )
