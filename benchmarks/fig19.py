@@ -27,6 +27,7 @@ from planners import Motion, plan, validate
 from planners.rollout import simulate_motion
 
 LINK_LENGTH, LONGEST = 430.0, 440.0  # the paper, section 5.1
+PLANNER = "beam"  # the paper's rules, clamped
 PAPER_MS_PER_POSE = 1.03  # the paper, section 4: its Fig. 17a on an Intel i5-4210U
 REPEATS = 15
 INWARD = (-5.0, 0.0, 1.0, 2.0, 5.0)
@@ -49,7 +50,7 @@ def measure_stages() -> tuple[Motion, dict[str, float]]:
     runs: list[dict[str, float]] = []
     motion = None
     for _ in track(range(REPEATS + 1), description="stages"):
-        result = plan(maze, arm)
+        result = plan(maze, arm, PLANNER)
         motion = result.motion
         assert motion is not None, result.reason
         episode = simulate_motion(motion, maze, arm)
@@ -89,7 +90,7 @@ def where(maze: Maze, touch: Touch) -> str:
 
 def fingerprint() -> str:
     """Return a hash of a whole run, plan and simulation, to the last bit."""
-    motion = plan(fig19(), ArmSpec(link_length=LINK_LENGTH)).motion
+    motion = plan(fig19(), ArmSpec(link_length=LINK_LENGTH), PLANNER).motion
     assert motion is not None
     episode = simulate_motion(motion, fig19())
     digest = hashlib.sha256(motion.joints.tobytes() + episode.joints.tobytes() + episode.rewards.tobytes())
@@ -151,7 +152,7 @@ def main() -> None:
         print(fingerprint())
         return
     motion, stages = measure_stages()
-    bend = plan(bend_moved(0.0), ArmSpec(link_length=560.0)).motion
+    bend = plan(bend_moved(0.0), ArmSpec(link_length=560.0), PLANNER).motion
     assert bend is not None
     results = {
         "machine": {

@@ -17,6 +17,9 @@ from planners.rollout import Episode, simulate_motion
 
 __all__ = ["Demo", "run_demo"]
 
+PLANNER = "beam"
+"""The paper's."""
+
 LINK_LENGTH = 430.0
 """The paper's links (section 5.1), in px."""
 
@@ -90,9 +93,9 @@ def run_demo(folder: Path, progress: Progress | None = None) -> Demo:
     maze, arm = Maze.load("fig19"), ArmSpec(link_length=LINK_LENGTH)
     tell = progress if progress is not None else lambda stage, share: None
     tell("compile", 0.0)
-    plan(maze, arm)  # the first plan on a machine compiles the kernels, which would hide the times shown
+    plan(maze, arm, PLANNER)  # the first plan on a machine compiles the kernels and would hide their times
     tell("compile", 1.0)
-    result = plan(maze, arm, progress=progress)
+    result = plan(maze, arm, PLANNER, progress=progress)
     if result.motion is None:
         return Demo(maze=maze, arm=arm, result=result, episode=None, files=())
     episode = simulate_motion(result.motion, maze, arm, progress=progress)

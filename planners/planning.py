@@ -10,15 +10,19 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners.beam_planner import plan_beam
 from planners.problem import Candidate, Motion, PlanningResult, PlanningStatus, Progress
+from planners.sweep_planner import plan_sweep
 from planners.validation import validate
 
 __all__ = ["PLANNERS", "plan"]
 
-PLANNERS: dict[str, Callable[[Maze, ArmSpec, Progress | None], Candidate]] = {"beam": plan_beam}
+PLANNERS: dict[str, Callable[[Maze, ArmSpec, Progress | None], Candidate]] = {
+    "beam": plan_beam,
+    "sweep": plan_sweep,
+}
 """All planners by name."""
 
-AUTO = "beam"
-"""The planner that `auto` takes."""
+AUTO = ("sweep", "beam")
+"""The planners that `auto` tries, in this order, until one has a motion that passes the checker."""
 
 
 def plan(
@@ -56,7 +60,16 @@ def plan(
     if planner != "auto" and planner not in PLANNERS:
         raise InputError(f"Unknown planner {planner!r}. Available: auto, {', '.join(PLANNERS)}.")
     maze.check_arm(arm)
-    name = AUTO if planner == "auto" else planner
+    first, *others = AUTO if planner == "auto" else (planner,)
+    result = _plan_with(first, maze, arm, progress)
+    for name in others:
+        if not result.solved:
+            other = _plan_with(name, maze, arm, progress)
+            result = other if other.solved else result
+    return result
+
+
+def _plan_with(name: str, maze: Maze, arm: ArmSpec, progress: Progress | None) -> PlanningResult:
     candidate = PLANNERS[name](maze, arm, progress)
     if candidate.motion is None:
         return PlanningResult(

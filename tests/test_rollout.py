@@ -23,13 +23,13 @@ NODE_ERROR = 0.05  # px: what the arm may be off its plan
 @pytest.fixture(scope="module")
 def benchmark():
     """Return the motion of the paper's links through the paper's benchmark."""
-    return plan(fig19(), ArmSpec(link_length=430.0)).motion
+    return plan(fig19(), ArmSpec(link_length=430.0), planner="beam").motion
 
 
 @pytest.fixture(scope="module")
 def bend():
     """Return a motion through a right-angled bend, as tight as to pass close to its inner corner."""
-    return plan(corridor_family("L"), ArmSpec(link_length=560.0)).motion
+    return plan(corridor_family("L"), ArmSpec(link_length=560.0), planner="beam").motion
 
 
 @pytest.fixture(scope="module")
@@ -127,9 +127,16 @@ def test_more_substeps_track_better(benchmark, episode, substeps):
     assert (other.report.node_error < episode.report.node_error) == (substeps > 4)
 
 
+def test_links_at_the_limit_have_a_clean_verdict_too():
+    motion = plan(fig19(), ArmSpec(link_length=439.2), planner="sweep").motion
+    episode = simulate_motion(motion, fig19())
+    assert episode.success and episode.report.clean
+    assert episode.report.node_error < NODE_ERROR
+
+
 def test_thick_links_are_simulated_as_thick():
     arm = ArmSpec(link_length=300.0, link_radius=15.0)
-    motion = plan(fig19(), arm).motion
+    motion = plan(fig19(), arm, planner="beam").motion
     assert simulate_motion(motion, fig19(), arm).report.clean
     thicker = ArmSpec(link_length=300.0, link_radius=20.0)
     report = simulate_motion(motion, fig19(), thicker).report

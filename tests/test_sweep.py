@@ -1,0 +1,94 @@
+"""Laws of the sweep: exact chords on one joint track, and how far it gets."""
+
+import numpy as np
+import pytest
+
+from hrsnake_env.arm import ArmSpec
+from hrsnake_env.maze import Maze
+from hrsnake_env.mazes import fig19
+from planners import PlanningStatus, plan
+from planners.beam_planner import survey
+from planners.corners import critical_corners
+from planners.kernels.sweep import FASTEST
+from planners.sweep_planner import MIN_CURVATURE, VARIANTS, _grow, aim_line, plan_sweep
+
+# In px, at corridors 200 wide: within half a percent of the longest that any planner here has passed.
+LONG = {
+    "fig19": 439.2,
+    "L": 562.0,
+    "U40": 439.0,
+    "U200": 560.0,
+    "S0": 760.0,
+    "S200": 423.0,
+    "S400": 443.0,
+    "S1000": 562.0,
+    "zig3": 439.0,
+    "serp": 439.0,
+}
+
+
+def track_of(maze, length, per_link=64):
+    """Return a track that takes every corner in the default way."""
+    geometry = survey(maze)
+    corners = critical_corners(geometry.path, geometry.beams, MIN_CURVATURE)
+    return _grow(geometry, ArmSpec(link_length=length), per_link, corners, [0] * len(corners))
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_links_near_the_limit_pass_every_turn(name):
+    result = plan(Maze.load(name), ArmSpec(link_length=LONG[name]), planner="sweep")
+    assert result.solved, result.reason
+    assert result.report.penetration == 0.0
+
+
+@pytest.mark.parametrize("share", [0.25, 0.5, 0.75, 0.9, 0.97])
+@pytest.mark.parametrize("name", ["S0", "zig3"])
+def test_shorter_links_pass_too(name, share):
+    result = plan(Maze.load(name), ArmSpec(link_length=share * LONG[name]), planner="sweep")
+    assert result.solved, result.reason
+
+
+@pytest.mark.parametrize(("name", "length"), [("fig19", 430.0), ("serp", 300.0)])
+def test_every_vertex_is_one_link_length_from_its_start(name, length):
+    track = track_of(Maze.load(name), length)
+    assert track.reached
+    vertices = np.arange(64, track.n)
+    chords = track.points[vertices] - track.points[track.start[vertices]]
+    np.testing.assert_allclose(np.hypot(*chords.T), length, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("name", "length"), [("fig19", 430.0), ("serp", 300.0), ("S200", 200.0)])
+def test_neighbouring_vertices_are_never_farther_apart_than_allowed(name, length):
+    track = track_of(Maze.load(name), length)
+    steps = np.hypot(*np.diff(track.points[: track.n], axis=0).T)
+    assert steps.max() <= FASTEST * length / 64 * (1 + 1e-9)
+
+
+def test_starts_only_move_forward():
+    track = track_of(fig19(), 430.0)
+    assert (np.diff(track.start[: track.n]) >= 0).all()
+
+
+def test_the_aim_swings_to_the_outer_wall_at_the_corner_and_fades_into_the_goal():
+    geometry = survey(fig19())
+    corners = critical_corners(geometry.path, geometry.beams, MIN_CURVATURE)[:1]
+    line = aim_line(geometry, corners, [VARIANTS[0]], 430.0)
+    np.testing.assert_allclose(line[-1], geometry.path.points[-1], atol=1e-9)
+    middle = (corners[0].first + corners[0].last) // 2
+    assert np.hypot(*(line[middle] - geometry.beams.left[middle])) < 0.1 * geometry.path.width
+
+
+def test_links_longer_than_any_rod_that_passes_end_in_a_dead_end():
+    # No rod longer than 440 passes: it must lie across both legs and the wall at some moment.
+    candidate = plan_sweep(fig19(), ArmSpec(link_length=445.0))
+    assert candidate.status is PlanningStatus.DEAD_END
+    assert candidate.motion is None and "stays free" in candidate.reason
+    assert candidate.place is not None
+
+
+def test_round_bends_of_many_short_walls_are_passed():
+    angle = np.linspace(np.pi, 0.0, 120)
+    bend = 300.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+    maze = Maze.from_corridors(np.vstack([[(-300.0, -900.0)], bend, [(300.0, -900.0)]]), 150.0)
+    result = plan(maze, ArmSpec(link_length=350.0), planner="sweep")
+    assert result.solved, result.reason
