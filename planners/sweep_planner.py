@@ -3,8 +3,8 @@
 Three things are changed in the paper's method (section 3). All links share one joint track instead of a
 memory per link, so a joint passes exactly where the joint ahead of it has passed. Every link aims its end,
 not its tangent, at the outer beam end of the corner nearest to that end. And of the directions that are free
-now only those are taken that stay free during the next link length of feed (viable intervals), so no link is led
-into a gap that closes; links then become tangent to corners by themselves.
+now only those are taken that stay free during the next link length of feed (viable intervals), so no link is
+led into a gap that closes; links then become tangent to corners by themselves.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ FASTEST = 1.9
 at most one step, so that there is room to turn meanwhile."""
 
 MOST_WAITING = 4
-"""Largest sum of turns in one place, in rad: a link that turns to and fro for longer will never leave it."""
+"""Largest sum of turns in one place, in rad: a link that turns back and forth for longer never leaves."""
 
 MOST_CREDIT = 0.3
 """Largest turn in place, in rad, that may be saved up while the arm is fed."""
