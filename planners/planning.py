@@ -60,13 +60,20 @@ def plan(
     if planner != "auto" and planner not in PLANNERS:
         raise InputError(f"Unknown planner {planner!r}. Available: auto, {', '.join(PLANNERS)}.")
     maze.check_arm(arm)
-    first, *others = AUTO if planner == "auto" else (planner,)
-    result = _plan_with(first, maze, arm, progress)
-    for name in others:
-        if not result.solved:
-            other = _plan_with(name, maze, arm, progress)
-            result = other if other.solved else result
-    return result
+    failures: list[PlanningResult] = []
+    shortage: InputError | None = None
+    for name in AUTO if planner == "auto" else (planner,):
+        try:
+            result = _plan_with(name, maze, arm, progress)
+        except InputError as error:  # another planner may need fewer links
+            shortage = shortage or error
+            continue
+        if result.solved:
+            return result
+        failures.append(result)
+    if shortage is not None:
+        raise shortage
+    return failures[0]
 
 
 def _plan_with(name: str, maze: Maze, arm: ArmSpec, progress: Progress | None) -> PlanningResult:

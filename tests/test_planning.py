@@ -101,6 +101,12 @@ def test_too_few_links_are_refused_with_the_number_it_takes(planner):
         plan(fig19(), ArmSpec(link_length=430.0, n_links=6), planner=planner)
 
 
+def test_a_planner_that_needs_fewer_links_is_found():
+    # At 439 px the sweep needs seven links and the paper's rules need six.
+    assert plan(fig19(), ArmSpec(link_length=439.0, n_links=6)).planner == "beam"
+    assert plan(fig19(), ArmSpec(link_length=439.0, n_links=7)).planner == "sweep"
+
+
 @EVERY
 def test_thick_links_are_planned_between_grown_walls(planner):
     arm = ArmSpec(link_length=300.0, link_radius=15.0)
