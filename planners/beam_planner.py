@@ -9,22 +9,18 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
 
 import numpy as np
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.maze import Maze
-from planners.beams import Beams, cast_beams
-from planners.corners import Corner, critical_corners
-from planners.inset import inset_maze
+from planners.corners import Corner
 from planners.kernels import beam as kernel
 from planners.kernels.types import FloatArray, IntArray
-from planners.path import Path, global_path
-from planners.potential import laplace_potential, passage_width
 from planners.problem import Candidate, Motion, PlanningStatus, Progress
+from planners.survey import Geometry, no_path, survey
 
-__all__ = ["Geometry", "plan_beam", "survey"]
+__all__ = ["plan_beam"]
 
 POSES_PER_LINK = 240
 """Regular number of poses per link length of feed; more where joints move fast."""
@@ -49,65 +45,6 @@ STOP = 0.5
 """The motion ends when the tip is this near to the goal, in goal radii."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Geometry:
-    """Hold the geometry of section 2 of the paper.
-
-    Parameters
-    ----------
-    maze : Maze
-        The maze, with walls grown by the radius of the links.
-    path, beams, corners
-        In that maze.
-    timings : dict from str to float
-        Seconds by stage: potential, path, beams.
-    """
-
-    maze: Maze
-    path: Path
-    beams: Beams
-    corners: list[Corner]
-    timings: dict[str, float]
-
-
-def survey(maze: Maze, link_radius: float = 0.0) -> Geometry | None:
-    """Compute path, beams and critical corners of a maze.
-
-    Parameters
-    ----------
-    maze : Maze
-        The maze.
-    link_radius : float
-        In maze units.
-
-    Returns
-    -------
-    geometry : Geometry or None
-        None if no path was found.
-    """
-    clock = [time.perf_counter()]
-    inset = inset_maze(maze, link_radius)
-    if inset is None:
-        return None
-    width = passage_width(inset)
-    potential = laplace_potential(inset, width=width)
-    clock.append(time.perf_counter())
-    path = global_path(inset, potential, width)
-    clock.append(time.perf_counter())
-    if path is None:
-        return None
-    beams = cast_beams(inset, path)
-    corners = critical_corners(path, beams)
-    clock.append(time.perf_counter())
-    return Geometry(
-        maze=inset,
-        path=path,
-        beams=beams,
-        corners=corners,
-        timings=dict(zip(("potential", "path", "beams"), np.diff(clock).tolist(), strict=True)),
-    )
-
-
 def plan_beam(maze: Maze, arm: ArmSpec, progress: Progress | None = None) -> Candidate:
     """Plan with the paper's rules, clamped to the exact free intervals.
 
@@ -127,11 +64,7 @@ def plan_beam(maze: Maze, arm: ArmSpec, progress: Progress | None = None) -> Can
     """
     geometry = survey(maze, arm.link_radius)
     if geometry is None:
-        return Candidate(
-            status=PlanningStatus.NO_PATH,
-            reason=f"No path for a disc of radius {arm.link_radius:g} leads from the base to the goal.",
-            place=(float(maze.goal[0]), float(maze.goal[1])),
-        )
+        return no_path(maze, arm)
     if progress is not None:
         progress("plan", 0.2)
     clock = [time.perf_counter()]

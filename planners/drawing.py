@@ -16,8 +16,8 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
 from hrsnake_env.rendering import MazePicture
-from planners.beam_planner import Geometry, survey
 from planners.problem import Motion, Progress
+from planners.survey import Geometry, survey
 
 __all__ = ["animate", "draw_geometry", "draw_poses"]
 

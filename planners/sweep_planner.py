@@ -19,11 +19,11 @@ import numpy as np
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.maze import Maze
-from planners.beam_planner import Geometry, survey
 from planners.corners import Corner, critical_corners
 from planners.kernels import sweep as kernel
 from planners.kernels.types import FloatArray, IntArray
 from planners.problem import Candidate, Motion, PlanningStatus, Progress
+from planners.survey import Geometry, no_path, survey
 
 __all__ = ["aim_line", "plan_sweep"]
 
@@ -115,11 +115,7 @@ def plan_sweep(maze: Maze, arm: ArmSpec, progress: Progress | None = None) -> Ca
     """
     geometry = survey(maze, arm.link_radius)
     if geometry is None:
-        return Candidate(
-            status=PlanningStatus.NO_PATH,
-            reason=f"No path for a disc of radius {arm.link_radius:g} leads from the base to the goal.",
-            place=(float(maze.goal[0]), float(maze.goal[1])),
-        )
+        return no_path(maze, arm)
     clock = [time.perf_counter()]
     track = _best_track(geometry, arm, progress)
     clock.append(time.perf_counter())

@@ -10,10 +10,10 @@ from shapely import affinity
 
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import LEGS, MAZES, fig19
-from planners.beam_planner import survey
 from planners.inset import inset_maze
 from planners.path import arclength, curvature, resampled, windowed
 from planners.potential import laplace_potential, passage_width
+from planners.survey import survey
 
 TURNS = {"N": 0, "E": 1, "S": 2, "W": 3}
 

@@ -7,9 +7,9 @@ from hrsnake_env.arm import ArmSpec
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import fig19
 from planners import PlanningStatus, plan
-from planners.beam_planner import survey
 from planners.corners import critical_corners
 from planners.kernels.sweep import FASTEST
+from planners.survey import survey
 from planners.sweep_planner import MIN_CURVATURE, VARIANTS, _grow, aim_line, plan_sweep
 
 # In px, at corridors 200 wide: within half a percent of the longest that any planner here has passed.
