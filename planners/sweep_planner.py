@@ -119,12 +119,19 @@ def plan_sweep(maze: Maze, arm: ArmSpec, progress: Progress | None = None) -> Ca
     clock = [time.perf_counter()]
     track = _best_track(geometry, arm, progress)
     clock.append(time.perf_counter())
+    if progress is not None:
+        progress("plan", 1.0)
     if not track.reached:
         x, y = (float(value) for value in track.points[track.n - 1])
+        why = (
+            "the joint track has grown out of all proportion to the path"
+            if track.ending == kernel.FULL
+            else "no direction of its link stays free during the next link length of feed"
+        )
         return Candidate(
             status=PlanningStatus.DEAD_END,
-            reason=f"With the tip at ({x:.1f}, {y:.1f}) {maze.units}, no direction of its link stays free "
-            f"during the next link length of feed, however the corners before it are taken.",
+            reason=f"With the tip at ({x:.1f}, {y:.1f}) {maze.units}, {why}, in every way tried to take the "
+            f"corners before it.",
             place=(x, y),
             timings={**geometry.timings, "plan": clock[1] - clock[0]},
         )

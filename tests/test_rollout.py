@@ -80,12 +80,21 @@ def test_tighter_walls_are_reported_as_collisions_of_that_depth(benchmark, inwar
     assert first.link == 6 and first.point == pytest.approx((-100 + inward, 433), abs=2)
 
 
-@pytest.mark.parametrize("inward", [2.0, 5.0])
-def test_an_inner_corner_in_the_way_is_named(bend, inward):
-    tighter = corridor_family("L", 200 - 2 * inward)
-    corners = [touch.corner for touch in simulate_motion(bend, tighter).report.kinematic.collisions]
-    assert (100 - inward, 1400 + inward) in corners or inward < 5.0
-    assert set(corners) <= {None, (100 - inward, 1400 + inward)}
+def test_an_inner_corner_is_named_as_pinched_and_deeper_in_as_collided(bend):
+    exact = simulate_motion(bend, corridor_family("L", 200 - 2 * 2.0)).report.kinematic
+    assert [touch.corner for touch in exact.pinched_corners] == [(98.0, 1402.0)]
+    assert all(touch.corner is None for touch in exact.collisions)
+    exact = simulate_motion(bend, corridor_family("L", 200 - 2 * 5.0)).report.kinematic
+    (corner,) = [touch for touch in exact.collisions if touch.corner is not None]
+    assert corner.corner == (95.0, 1405.0)
+    # The moved corner itself is the reference: its distance from the deepest link of all poses.
+    links = np.stack([bend.joints[:, :-1], bend.joints[:, 1:]], axis=2).reshape(-1, 2, 2)
+    along = links[:, 1] - links[:, 0]
+    offset = np.array(corner.corner) - links[:, 0]
+    side = (along[:, 0] * offset[:, 1] - along[:, 1] * offset[:, 0]) / np.hypot(*along.T)
+    across = (offset * along).sum(axis=1) / (along**2).sum(axis=1)
+    deepest = side[(across > 0) & (across < 1) & (np.abs(side) < 20)].max()
+    assert -corner.clearance == pytest.approx(deepest, abs=0.05)
 
 
 def test_wider_walls_are_not_touched(benchmark):
