@@ -17,8 +17,9 @@ from hrsnake_env.maze import Maze
 from planners.corners import Corner
 from planners.kernels import beam as kernel
 from planners.kernels.types import FloatArray, IntArray
-from planners.problem import Candidate, Motion, PlanningStatus, Progress
-from planners.survey import Geometry, no_path, survey
+from planners.problem import Candidate, Failure, Motion, PlanningStatus
+from planners.query import Query
+from planners.survey import Geometry
 
 __all__ = ["plan_beam"]
 
@@ -45,39 +46,33 @@ STOP = 0.5
 """The motion ends when the tip is this near to the goal, in goal radii."""
 
 
-def plan_beam(maze: Maze, arm: ArmSpec, progress: Progress | None = None) -> Candidate:
+def plan_beam(query: Query) -> Candidate:
     """Plan with the paper's rules, clamped to the exact free intervals.
 
     Parameters
     ----------
-    maze : Maze
-        The maze; the arm fits its feeder (`Maze.check_arm`).
-    arm : ArmSpec
-        The arm; `n_links` is not used.
-    progress : callable, optional
-        Called after each stage.
+    query : Query
+        Maze, arm and terms; no warm start is used, and one run takes milliseconds, so no deadline either.
 
     Returns
     -------
     candidate : Candidate
         A motion with as many links as it needs, not yet validated, or the reason why there is none.
     """
-    geometry = survey(maze, arm.link_radius)
+    maze, arm, geometry = query.maze, query.arm, query.geometry
     if geometry is None:
-        return no_path(maze, arm)
-    if progress is not None:
-        progress("plan", 0.2)
+        return query.no_path()
+    query.tell("plan", 0.2)
     clock = [time.perf_counter()]
     feeds, headings, failure = _sweep(geometry, arm)
     clock.append(time.perf_counter())
-    if progress is not None:
-        progress("plan", 1.0)
+    query.tell("plan", 1.0)
     if failure is not None:
         ending, link, place = failure
         return Candidate(
             status=PlanningStatus.DEAD_END,
             reason=_reason(ending, link, place, maze),
-            place=place,
+            failure=Failure(place=place),
             timings={**geometry.timings, "plan": clock[1] - clock[0]},
         )
     motion = _motion(feeds, headings, arm.link_length, maze)

@@ -11,7 +11,7 @@ from planners.kernels.grid import ascend
 from planners.kernels.types import FloatArray
 from planners.potential import Potential
 
-__all__ = ["Path", "arclength", "curvature", "descend", "global_path", "resampled", "windowed"]
+__all__ = ["Path", "arclength", "curvature", "descend", "global_path", "path_along", "resampled", "windowed"]
 
 POINTS_PER_WIDTH = 25.0
 """Path points per passage width."""
@@ -163,9 +163,22 @@ def global_path(maze: Maze, potential: Potential, width: float, window: int = WI
         None if the potential does not lead to the goal.
     """
     streamline = descend(maze, potential)
-    if streamline is None:
-        return None
-    raw = resampled(streamline, width / POINTS_PER_WIDTH)
+    return None if streamline is None else path_along(streamline, width, window)
+
+
+def path_along(line: FloatArray, width: float, window: int = WINDOW) -> Path:
+    """Resample and smooth a line, shape (n, 2), into a path scaled with the passage width.
+
+    Parameters
+    ----------
+    line : array, shape (n, 2)
+        From base to goal, in maze units.
+    width : float
+        The passage width, which sets the spacing of the points.
+    window : int
+        Points on each side in the moving average.
+    """
+    raw = resampled(line, width / POINTS_PER_WIDTH)
     points = windowed(raw, window)
     return Path(
         points=points,

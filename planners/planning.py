@@ -9,13 +9,14 @@ from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners.beam_planner import plan_beam
-from planners.problem import Candidate, Motion, PlanningResult, PlanningStatus, Progress
+from planners.problem import Candidate, Failure, Motion, PlanningResult, PlanningStatus, Progress
+from planners.query import Query
 from planners.sweep_planner import plan_sweep
 from planners.validation import validate
 
 __all__ = ["PLANNERS", "plan"]
 
-PLANNERS: dict[str, Callable[[Maze, ArmSpec, Progress | None], Candidate]] = {
+PLANNERS: dict[str, Callable[[Query], Candidate]] = {
     "beam": plan_beam,
     "sweep": plan_sweep,
 }
@@ -77,13 +78,13 @@ def plan(
 
 
 def _plan_with(name: str, maze: Maze, arm: ArmSpec, progress: Progress | None) -> PlanningResult:
-    candidate = PLANNERS[name](maze, arm, progress)
+    candidate = PLANNERS[name](Query(maze=maze, arm=arm, progress=progress))
     if candidate.motion is None:
         return PlanningResult(
             status=candidate.status,
             planner=name,
             reason=candidate.reason,
-            place=candidate.place,
+            failure=candidate.failure,
             timings=candidate.timings,
         )
     motion = _with_wanted_links(candidate.motion, maze, arm)
@@ -99,7 +100,7 @@ def _plan_with(name: str, maze: Maze, arm: ArmSpec, progress: Progress | None) -
         status=PlanningStatus.NOT_VALID,
         planner=name,
         reason=f"The exact check refused the motion: {fault.message}",
-        place=fault.place,
+        failure=None if fault.place is None else Failure(place=fault.place),
         report=report,
         timings=timings,
     )

@@ -18,7 +18,16 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
 
-__all__ = ["Candidate", "Fault", "Motion", "PlanningResult", "PlanningStatus", "Progress", "ValidationReport"]
+__all__ = [
+    "Candidate",
+    "Failure",
+    "Fault",
+    "Motion",
+    "PlanningResult",
+    "PlanningStatus",
+    "Progress",
+    "ValidationReport",
+]
 
 Progress = Callable[[str, float], None]
 """Called with the name of a stage and the share of it that is done, in [0, 1]."""
@@ -272,6 +281,35 @@ class PlanningStatus(StrEnum):
     NO_PATH = "no path"
     DEAD_END = "dead end"
     NOT_VALID = "not valid"
+    OUT_OF_TIME = "out of time"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Failure:
+    """Say where a planner could not go on, and what is in the way.
+
+    Parameters
+    ----------
+    place : tuple of two floats
+        Where, in maze units.
+    path_position : float or None
+        Arclength along the path up to there.
+    link : int or None
+        The link that finds no way, counted from the tip (0).
+    wall : int or None
+        Index in `Maze.walls` of the wall that is most in its way.
+    depth : float or None
+        How deep the link would be in that wall where the planner wants it, in maze units.
+    joints : array, shape (n_joints, 2), or None
+        The arm as far as it came, from the base to the tip, for a picture.
+    """
+
+    place: tuple[float, float]
+    path_position: float | None = None
+    link: int | None = None
+    wall: int | None = None
+    depth: float | None = None
+    joints: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -284,14 +322,14 @@ class Candidate:
         SOLVED if there is a motion; it is not validated yet.
     motion : Motion or None
         With as many links as it needs.
-    reason, place, timings
+    reason, failure, timings
         As in `PlanningResult`.
     """
 
     status: PlanningStatus
     motion: Motion | None = None
     reason: str = ""
-    place: tuple[float, float] | None = None
+    failure: Failure | None = None
     timings: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -309,8 +347,10 @@ class PlanningResult:
         The motion.
     reason : str
         One sentence; empty when solved.
-    place : tuple of two floats, or None
-        Where planning ended, in maze units.
+    failure : Failure or None
+        Where planning ended and what is in the way; None when solved.
+    longest_there : float or None
+        The longest link with which the planner gets past that place; None if not looked for.
     report : ValidationReport or None
         What the checker said of the motion that was tried.
     timings : mapping from str to float
@@ -321,12 +361,18 @@ class PlanningResult:
     planner: str
     motion: Motion | None = None
     reason: str = ""
-    place: tuple[float, float] | None = None
+    failure: Failure | None = None
+    longest_there: float | None = None
     report: ValidationReport | None = None
     timings: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "timings", MappingProxyType(dict(self.timings)))
+
+    @property
+    def place(self) -> tuple[float, float] | None:
+        """Where planning ended, in maze units."""
+        return None if self.failure is None else self.failure.place
 
     @property
     def solved(self) -> bool:
@@ -340,6 +386,11 @@ class PlanningResult:
             "planner": self.planner,
             "reason": self.reason,
             "place": self.place,
+            "path_position": None if self.failure is None else self.failure.path_position,
+            "link": None if self.failure is None else self.failure.link,
+            "wall": None if self.failure is None else self.failure.wall,
+            "depth": None if self.failure is None else self.failure.depth,
+            "longest_there": self.longest_there,
             "n_poses": None if self.motion is None else self.motion.n_poses,
             "n_links": None if self.motion is None else self.motion.n_links,
             "timings": dict(self.timings),

@@ -7,16 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrsnake_env.arm import ArmSpec
 from hrsnake_env.maze import Maze
 from planners.beams import Beams, cast_beams
 from planners.corners import Corner, critical_corners
 from planners.inset import inset_maze
-from planners.path import Path, global_path
+from planners.kernels.types import FloatArray
+from planners.path import Path, global_path, path_along
 from planners.potential import laplace_potential, passage_width
-from planners.problem import Candidate, PlanningStatus
 
-__all__ = ["Geometry", "no_path", "survey"]
+__all__ = ["Geometry", "survey"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -40,7 +39,7 @@ class Geometry:
     timings: dict[str, float]
 
 
-def survey(maze: Maze, link_radius: float = 0.0) -> Geometry | None:
+def survey(maze: Maze, link_radius: float = 0.0, route: FloatArray | None = None) -> Geometry | None:
     """Compute path, beams and critical corners of a maze.
 
     Parameters
@@ -49,6 +48,8 @@ def survey(maze: Maze, link_radius: float = 0.0) -> Geometry | None:
         The maze.
     link_radius : float
         In maze units.
+    route : array, shape (n, 2), optional
+        Waypoints from base to goal that the path shall follow; by default it follows the potential.
 
     Returns
     -------
@@ -60,9 +61,13 @@ def survey(maze: Maze, link_radius: float = 0.0) -> Geometry | None:
     if inset is None:
         return None
     width = passage_width(inset)
-    potential = laplace_potential(inset, width=width)
-    clock.append(time.perf_counter())
-    path = global_path(inset, potential, width)
+    if route is None:
+        potential = laplace_potential(inset, width=width)
+        clock.append(time.perf_counter())
+        path = global_path(inset, potential, width)
+    else:
+        clock.append(clock[0])
+        path = path_along(route, width)
     clock.append(time.perf_counter())
     if path is None:
         return None
@@ -75,13 +80,4 @@ def survey(maze: Maze, link_radius: float = 0.0) -> Geometry | None:
         beams=beams,
         corners=corners,
         timings=dict(zip(("potential", "path", "beams"), np.diff(clock).tolist(), strict=True)),
-    )
-
-
-def no_path(maze: Maze, arm: ArmSpec) -> Candidate:
-    """Return the outcome where there is nothing to survey."""
-    return Candidate(
-        status=PlanningStatus.NO_PATH,
-        reason=f"No path for a disc of radius {arm.link_radius:g} leads from the base to the goal.",
-        place=(float(maze.goal[0]), float(maze.goal[1])),
     )

@@ -22,8 +22,9 @@ from hrsnake_env.maze import Maze
 from planners.corners import Corner, critical_corners
 from planners.kernels import sweep as kernel
 from planners.kernels.types import FloatArray, IntArray
-from planners.problem import Candidate, Motion, PlanningStatus, Progress
-from planners.survey import Geometry, no_path, survey
+from planners.problem import Candidate, Failure, Motion, PlanningStatus
+from planners.query import Query
+from planners.survey import Geometry
 
 __all__ = ["aim_line", "plan_sweep"]
 
@@ -96,31 +97,26 @@ class _Track:
         return self.ending == kernel.GOAL
 
 
-def plan_sweep(maze: Maze, arm: ArmSpec, progress: Progress | None = None) -> Candidate:
+def plan_sweep(query: Query) -> Candidate:
     """Plan with the sweep: one joint track inside viable intervals.
 
     Parameters
     ----------
-    maze : Maze
-        The maze; the arm fits its feeder (`Maze.check_arm`).
-    arm : ArmSpec
-        The arm; `n_links` is not used.
-    progress : callable, optional
-        Called with "plan" and the share of attempts that are used up.
+    query : Query
+        Maze, arm and terms.
 
     Returns
     -------
     candidate : Candidate
         A motion with as many links as it needs, not yet validated, or the reason why there is none.
     """
-    geometry = survey(maze, arm.link_radius)
+    maze, arm, geometry = query.maze, query.arm, query.geometry
     if geometry is None:
-        return no_path(maze, arm)
+        return query.no_path()
     clock = [time.perf_counter()]
-    track = _best_track(geometry, arm, progress)
+    track = _best_track(geometry, query)
     clock.append(time.perf_counter())
-    if progress is not None:
-        progress("plan", 1.0)
+    query.tell("plan", 1.0)
     if not track.reached:
         x, y = (float(value) for value in track.points[track.n - 1])
         why = (
@@ -132,7 +128,7 @@ def plan_sweep(maze: Maze, arm: ArmSpec, progress: Progress | None = None) -> Ca
             status=PlanningStatus.DEAD_END,
             reason=f"With the tip at ({x:.1f}, {y:.1f}) {maze.units}, {why}, in every way tried to take the "
             f"corners before it.",
-            place=(x, y),
+            failure=Failure(place=(x, y)),
             timings={**geometry.timings, "plan": clock[1] - clock[0]},
         )
     motion = _motion(track, arm.link_length, maze)
@@ -180,13 +176,12 @@ def aim_line(
     return path.points + (lateral * outer)[:, None] * beams.normals
 
 
-def _best_track(geometry: Geometry, arm: ArmSpec, progress: Progress | None) -> _Track:
+def _best_track(geometry: Geometry, query: Query) -> _Track:
     """Return the first track that reaches the goal, or else the one that came farthest."""
     best: _Track | None = None
     for number, per_link in enumerate(RESOLUTIONS):
-        for attempt, track in enumerate(_attempts(geometry, arm, per_link)):
-            if progress is not None:
-                progress("plan", (number + attempt / MAX_ATTEMPTS) / len(RESOLUTIONS))
+        for attempt, track in enumerate(_attempts(geometry, query.arm, per_link)):
+            query.tell("plan", (number + attempt / MAX_ATTEMPTS) / len(RESOLUTIONS))
             if track.reached:
                 return track
             if best is None or track.index > best.index:

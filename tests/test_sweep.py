@@ -9,6 +9,7 @@ from hrsnake_env.mazes import fig19
 from planners import PlanningStatus, plan
 from planners.corners import critical_corners
 from planners.kernels.sweep import FASTEST
+from planners.query import Query
 from planners.survey import survey
 from planners.sweep_planner import MIN_CURVATURE, VARIANTS, _grow, aim_line, plan_sweep
 
@@ -80,10 +81,10 @@ def test_the_aim_swings_to_the_outer_wall_at_the_corner_and_fades_into_the_goal(
 
 def test_links_longer_than_any_rod_that_passes_end_in_a_dead_end():
     # No rod longer than 440 passes: it must lie across both legs and the wall at some moment.
-    candidate = plan_sweep(fig19(), ArmSpec(link_length=445.0))
+    candidate = plan_sweep(Query(maze=fig19(), arm=ArmSpec(link_length=445.0)))
     assert candidate.status is PlanningStatus.DEAD_END
     assert candidate.motion is None and "stays free" in candidate.reason
-    assert candidate.place is not None
+    assert candidate.failure is not None
 
 
 def test_round_bends_of_many_short_walls_are_passed():

@@ -1,0 +1,68 @@
+"""What a planner is asked, and the terms on which it works."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from functools import cached_property
+
+from hrsnake_env.arm import ArmSpec
+from hrsnake_env.maze import Maze
+from planners.kernels.types import FloatArray
+from planners.problem import Candidate, Failure, Motion, PlanningStatus, Progress
+from planners.survey import Geometry, survey
+
+__all__ = ["Query"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Query:
+    """Hold one planning query; every planner is a function of it.
+
+    Parameters
+    ----------
+    maze : Maze
+        The maze; the arm fits its feeder (`Maze.check_arm`).
+    arm : ArmSpec
+        The arm; planners do not use `n_links`, they give as many links as the motion needs.
+    deadline : float
+        When to stop, on the clock of `time.perf_counter`.
+    warm_start : Motion or None
+        A motion of the same links in a similar maze, to start from.
+    route : array, shape (n, 2), or None
+        Waypoints from the base to the goal through the free space: which way round the obstacles. By default
+        the way of the Laplace potential.
+    progress : callable or None
+        Told about stage and share done.
+    """
+
+    maze: Maze
+    arm: ArmSpec
+    deadline: float = math.inf
+    warm_start: Motion | None = None
+    route: FloatArray | None = None
+    progress: Progress | None = None
+
+    @cached_property
+    def geometry(self) -> Geometry | None:
+        """Path, beams and corners of the route; None if nothing leads to the goal. Computed once."""
+        return survey(self.maze, self.arm.link_radius, self.route)
+
+    def tell(self, stage: str, share: float) -> None:
+        """Report progress."""
+        if self.progress is not None:
+            self.progress(stage, share)
+
+    @property
+    def late(self) -> bool:
+        """Whether the deadline has passed."""
+        return time.perf_counter() >= self.deadline
+
+    def no_path(self) -> Candidate:
+        """Return the outcome where there is nothing to survey."""
+        return Candidate(
+            status=PlanningStatus.NO_PATH,
+            reason=f"No path for a disc of radius {self.arm.link_radius:g} leads from the base to the goal.",
+            failure=Failure(place=(float(self.maze.goal[0]), float(self.maze.goal[1]))),
+        )
