@@ -1,16 +1,30 @@
-"""The named mazes: the paper's benchmark and the families of turns, all of corridor width 200."""
+"""The named mazes: the paper's, the families of turns of corridor width 200, and seeded random ones."""
 
 from __future__ import annotations
 
 from functools import partial
 
 import numpy as np
-from shapely.geometry import Polygon
+from shapely import unary_union
+from shapely.geometry import LineString, Point, Polygon, box
 
+from hrsnake_env.arm import FloatArray
 from hrsnake_env.errors import InputError
-from hrsnake_env.maze import MAZES, Maze
+from hrsnake_env.maze import MAZES, SEEDED_MAZES, Maze
 
-__all__ = ["MAZES", "corridor_family", "fig19"]
+__all__ = [
+    "MAZES",
+    "SEEDED_MAZES",
+    "clutter_hall",
+    "corridor_family",
+    "fig17a",
+    "fig19",
+    "random_corridor",
+    "serpentine",
+]
+
+FIG17A_LEG = 1215.0
+"""With it the smoothed global path is 10,505 px long within 1 %, and 45 links of 245 px just reach."""
 
 DIRECTIONS = {"N": (0.0, 1.0), "E": (1.0, 0.0), "S": (0.0, -1.0), "W": (-1.0, 0.0)}
 
@@ -106,5 +120,112 @@ def corridor_family(name: str, width: float = 200.0) -> Maze:
     return Maze.from_corridors(np.array(waypoints), width, name=name)
 
 
+def fig17a(leg: float = FIG17A_LEG) -> Maze:
+    """Build the first of the paper's extremely tight mazes (Fig. 17a): four U-turns, then a spiral.
+
+    A reconstruction: the paper prints the number of links (45), their length (245 px), the largest joint
+    angle and the length of the global path (10,505 px), no figure of the maze. Here the longest rods that
+    pass are 254 px in the U-turns of width 118 and 254.6 px in the bends of width 90.
+
+    Parameters
+    ----------
+    leg : float
+        Length of the legs of the U-turns, in px.
+
+    Raises
+    ------
+    InputError
+        If the leg is too short to hold the spiral.
+    """
+    if not (np.isfinite(leg) and leg >= 600.0):
+        raise InputError(f"Expected a finite leg of at least 600, got {leg!r}.")
+    turns = [(0, -320), (0, leg), (136, leg), (136, 0), (272, 0), (272, leg), (408, leg), (408, 0), (544, 0)]
+    spiral = [(544, leg - 60), (544, leg + 320), (1624, leg + 320), (1624, -540), (804, -540)]
+    inner = [(804, leg + 20), (1324, leg + 20), (1324, leg - 240)]
+    return Maze.from_corridors(
+        [[*turns, (544, leg)], [*spiral, *inner]],
+        [118.0, 90.0],
+        name="fig17a",
+        goal=(1324.0, leg - 200.0),
+    )
+
+
+def serpentine(n_turns: int, *, width: float = 118.0, pitch: float = 136.0, leg: float = 1200.0) -> Maze:
+    """Build parallel legs joined by U-turns, as those of `fig17a`, to any length.
+
+    Parameters
+    ----------
+    n_turns : int
+        Number of U-turns.
+    width, pitch, leg : float
+        Of the corridor, between the legs' centrelines, and of the legs, in px.
+    """
+    waypoints = [(0.0, -320.0)]
+    for turn in range(n_turns + 1):
+        ends = (0.0, leg) if turn % 2 == 0 else (leg, 0.0)
+        waypoints += [(turn * pitch, end) for end in (ends if turn else ends[1:])]
+    return Maze.from_corridors(np.array(waypoints), width, name=f"serpentine of {n_turns} turns")
+
+
+def random_corridor(seed: int) -> Maze:
+    """Draw a corridor of seven turns of 35 to 125 degrees to either side, 120 to 220 px wide.
+
+    Corridors that touch themselves are drawn again.
+    """
+    rng = np.random.default_rng(seed)
+    while True:
+        width = rng.uniform(120.0, 220.0)
+        turns = np.radians(rng.uniform(35.0, 125.0, 7)) * rng.choice([-1.0, 1.0], 7)
+        headings = np.pi / 2 + np.concatenate([[0.0], np.cumsum(turns)])
+        legs = np.concatenate([[7.0], rng.uniform(1.5, 5.0, 6), [5.0]]) * width
+        steps = legs[:, None] * np.column_stack([np.cos(headings), np.sin(headings)])
+        waypoints = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+        if _keeps_apart(waypoints, width):
+            return Maze.from_corridors(waypoints, width, name=f"corridor-{seed}")
+
+
+def _keeps_apart(waypoints: FloatArray, width: float) -> bool:
+    """Tell whether legs that do not follow one another are more than a quarter of the width apart."""
+    legs = [LineString(waypoints[k : k + 2]) for k in range(len(waypoints) - 1)]
+    return all(
+        legs[i].distance(legs[j]) > 1.25 * width for i in range(len(legs)) for j in range(i + 2, len(legs))
+    )
+
+
+def clutter_hall(seed: int) -> Maze:
+    """Draw a hall of 2000 x 1400 px with 28 convex pillars of 3 to 8 corners, 60 to 130 px in radius.
+
+    Pillars may touch. The base is on the left, with 300 px of free way in front of it, the goal on the right.
+    """
+    rng = np.random.default_rng(seed)
+    while True:
+        base = np.array([5.0, rng.uniform(200.0, 1200.0)])
+        goal = np.array([1900.0, rng.uniform(100.0, 1300.0)])
+        kept_free = (
+            LineString([base, (base[0] + 300.0, base[1])]).buffer(40.0).union(Point(goal).buffer(60.0))
+        )
+        pillars: list[Polygon] = []
+        while len(pillars) < 28:
+            angles = np.sort(rng.uniform(0.0, 2 * np.pi, rng.integers(3, 9)))
+            corners = np.column_stack([np.cos(angles), np.sin(angles)]) * rng.uniform(60.0, 130.0)
+            pillar = Polygon(corners + rng.uniform((150.0, 0.0), (1950.0, 1400.0)))
+            if pillar.area > 1500.0 and not pillar.intersects(kept_free):
+                pillars.append(pillar)
+        free_space = box(0.0, 0.0, 2000.0, 1400.0).difference(unary_union(pillars))
+        try:
+            return Maze(
+                name=f"clutter-{seed}",
+                free_space=free_space,
+                base_pose=np.array([*base, 0.0]),
+                goal=goal,
+                goal_radius=25.0,
+            )
+        except InputError:  # the pillars have walled in the goal
+            continue
+
+
 MAZES["fig19"] = fig19
+MAZES["fig17a"] = fig17a
+SEEDED_MAZES["corridor"] = random_corridor
+SEEDED_MAZES["clutter"] = clutter_hall
 MAZES.update({name: partial(corridor_family, name) for name in LEGS})
