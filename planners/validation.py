@@ -26,6 +26,8 @@ import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
+import numpy as np
+
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
@@ -42,6 +44,7 @@ from planners.checks.arm_alone import (
 from planners.checks.between import check_between
 from planners.checks.crossing import check_crossing
 from planners.checks.scene import PINCH_TOLERANCE, ROUNDING, Scene
+from planners.checks.sieve import sift
 from planners.checks.walls import check_poses
 from planners.problem import Motion, Progress, ValidationReport
 
@@ -100,8 +103,9 @@ def validate(
     length_error, length = check_lengths(scene)
     largest_step, step = check_steps(scene)
     goal_distance, goal = check_goal(scene)
-    clearance, penetration, deep = check_poses(scene, tell)
-    between, sweep = check_between(scene, deep, tell)
+    sifted = sift(scene, tell)
+    clearance, penetration, deep = check_poses(scene, sifted.doubtful(scene), tell)
+    between, sweep = check_between(scene, sifted.open_steps, deep, tell)
     depth = 0.0 if penetration is None else penetration.amount
     found = [
         length,
@@ -113,13 +117,16 @@ def validate(
         penetration,
         sweep,
     ]
-    found += [check_crossing(scene, tell), check_joint_limit(scene, arm.joint_limit)]
+    found += [
+        check_crossing(scene, np.concatenate(sifted.pairs), tell),
+        check_joint_limit(scene, arm.joint_limit),
+    ]
     tell("validate", 1.0)
     return ValidationReport(
         faults=tuple(fault for fault in found if fault is not None),
         clearance=clearance,
         penetration=depth,
-        penetration_between=max(between, depth),
+        penetration_between=max(between, depth, sifted.bound),
         largest_step=largest_step,
         length_error=length_error,
         goal_distance=goal_distance,

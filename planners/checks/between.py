@@ -123,16 +123,20 @@ class _Pieces:
         return segments, scene.emerging(arc[:, 0])
 
 
-def check_between(scene: Scene, deep: BoolArray, tell: Progress) -> tuple[float, Fault | None]:
+def check_between(
+    scene: Scene, doubtful: BoolArray, deep: BoolArray, tell: Progress
+) -> tuple[float, Fault | None]:
     """Bound the depth between poses, and find the worst place where there is no bound up to the tolerance.
 
-    Links that are deeper at one of the two poses are left out: the fault of that pose says it already.
+    Only links that are `doubtful` after a pose are looked at, and of these not those that are deeper at one
+    of the two poses: the fault of that pose says it already.
     """
     motion, bound = scene.motion, 0.0
-    regions = [_region(scene, share * PINCH_TOLERANCE * scene.length) for share in GROWTHS]
     skipped = deep[1:] | deep[:-1]
     moving = np.maximum(scene.arc[1:, 1:], scene.arc[:-1, 1:]) > ROUNDING * scene.length
-    interval, link = np.nonzero(moving & ~skipped)
+    interval, link = np.nonzero(moving & doubtful[:-1] & ~skipped)
+    shares = GROWTHS if len(link) else ()
+    regions = [_region(scene, share * PINCH_TOLERANCE * scene.length) for share in shares]
     open_: list[_Pieces] = []
     for first in range(0, motion.n_poses - 1, CHUNK):
         chosen = (interval >= first) & (interval < first + CHUNK)
@@ -141,7 +145,7 @@ def check_between(scene: Scene, deep: BoolArray, tell: Progress) -> tuple[float,
         chunk_bound, chunk_open = _swept(scene, pieces, regions)
         bound = max(bound, chunk_bound)
         open_ += [piece for piece in chunk_open if len(piece)]
-        tell("validate", 0.3 + 0.5 * min(1.0, (first + CHUNK) / motion.n_poses))
+        tell("validate", 0.6 + 0.2 * min(1.0, (first + CHUNK) / motion.n_poses))
     if open_:
         return math.inf, _sweep_fault(scene, open_)
     return math.inf if skipped.any() else bound, None

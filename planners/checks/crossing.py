@@ -10,7 +10,6 @@ import shapely
 from planners.checks.scene import (
     CHUNK,
     MAX_SPLITS,
-    PLACE_SLACK,
     ROUNDING,
     IntArray,
     Scene,
@@ -22,7 +21,7 @@ from planners.checks.scene import (
 from planners.problem import Fault, Progress
 
 
-def check_crossing(scene: Scene, tell: Progress) -> Fault | None:
+def check_crossing(scene: Scene, pairs: IntArray, tell: Progress) -> Fault | None:
     """Check that links keep apart, by the distances at the ends of ever shorter pieces of time.
 
     A point of a link that moves along a chord c is at most t * c + e from its place at the start and at most
@@ -37,28 +36,12 @@ def check_crossing(scene: Scene, tell: Progress) -> Fault | None:
         return joint_fault(scene, "crossing", message, pose, joint + 1, 0.0)
     n_intervals = max(1, scene.motion.n_poses - 1)
     for first in range(0, n_intervals, CHUNK):
-        pairs = _near_pairs(scene, np.arange(first, min(first + CHUNK, n_intervals)))
-        found = _first_meeting(scene, *pairs)
+        chosen = pairs[(pairs[:, 0] >= first) & (pairs[:, 0] < min(first + CHUNK, n_intervals))]
+        found = _first_meeting(scene, *chosen.T)
         if found is not None:
             return _crossing_fault(scene, *found)
         tell("validate", 0.8 + 0.2 * min(1.0, (first + CHUNK) / n_intervals))
     return None
-
-
-def _near_pairs(scene: Scene, interval: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-    """Find the pairs of non-adjacent links whose middles are not far apart: interval, first, second."""
-    motion, after = scene.motion, np.minimum(interval + 1, scene.motion.n_poses - 1)
-    first, second = np.triu_indices(motion.n_links, 2)
-    joints = scene.in_maze(motion.joints[interval], scene.arc[interval])
-    move = np.linalg.norm(motion.joints[after] - motion.joints[interval], axis=2) + scene.curvature[interval]
-    reach = np.linalg.norm(np.diff(joints, axis=1), axis=2) / 2.0 + np.maximum(move[:, :-1], move[:, 1:])
-    middle = (joints[:, :-1] + joints[:, 1:]) / 2.0
-    apart = np.linalg.norm(middle[:, first] - middle[:, second], axis=2)
-    slack = 2.0 * scene.radius + 2.0 * PLACE_SLACK * scene.length
-    near = apart <= reach[:, first] + reach[:, second] + slack
-    near &= np.maximum(scene.arc[interval], scene.arc[after])[:, first + 1] > 0.0
-    row, pair = np.nonzero(near)
-    return interval[row], first[pair], second[pair]
 
 
 def _first_meeting(

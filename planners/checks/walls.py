@@ -22,15 +22,18 @@ from planners.checks.scene import (
 from planners.problem import Fault, Progress
 
 
-def check_poses(scene: Scene, tell: Progress) -> tuple[float, Fault | None, BoolArray]:
-    """Check all poses: clearance, the worst penetration, and the links deeper than any sweep allows."""
+def check_poses(scene: Scene, doubtful: BoolArray, tell: Progress) -> tuple[float, Fault | None, BoolArray]:
+    """Check all poses: clearance, the worst penetration, and the links deeper than any sweep allows.
+
+    Links that are not `doubtful` are free, and not the nearest to a wall.
+    """
     motion = scene.motion
     deep = np.zeros((motion.n_poses, motion.n_links), dtype=bool)
     worst: tuple[float, int, int, FloatArray] = (math.inf, 0, 0, motion.joints[0, -1])
     for first in range(0, motion.n_poses, CHUNK):
         arc = scene.arc[first : first + CHUNK]
         joints = scene.in_maze(motion.joints[first : first + CHUNK], arc)
-        pose, link = np.nonzero(arc[:, 1:] > ROUNDING * scene.length)
+        pose, link = np.nonzero(doubtful[first : first + CHUNK] & (arc[:, 1:] > ROUNDING * scene.length))
         if len(pose):
             segments = np.stack([joints[pose, link], joints[pose, link + 1]], axis=1)
             emerging = scene.emerging(arc[pose, link])
@@ -38,7 +41,7 @@ def check_poses(scene: Scene, tell: Progress) -> tuple[float, Fault | None, Bool
             if clearance < worst[0]:
                 worst = (clearance, first + int(pose[index]), int(link[index]), place)
             deep[first + pose, link] = are_deep(scene, segments, emerging)
-        tell("validate", 0.3 * min(1.0, (first + CHUNK) / motion.n_poses))
+        tell("validate", 0.5 + 0.1 * min(1.0, (first + CHUNK) / motion.n_poses))
     clearance, where, link_index, place = worst
     if clearance >= (0.0 if scene.radius == 0.0 else -ROUNDING * scene.length):
         return clearance, None, deep
