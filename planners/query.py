@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.maze import Maze
 from planners.kernels.types import FloatArray
-from planners.problem import Candidate, Failure, Motion, PlanningStatus, Progress
+from planners.problem import Candidate, Failure, Motion, PlanningStatus, Progress, ValidationReport
 from planners.survey import Geometry, survey
 
 __all__ = ["Query"]
@@ -33,6 +34,8 @@ class Query:
     route : array, shape (n, 2), or None
         Waypoints from the base to the goal through the free space: which way round the obstacles. By default
         the way of the Laplace potential.
+    checker : callable or None
+        Says of a motion whether it is valid, as `planners.validation.validate` does.
     progress : callable or None
         Told about stage and share done.
     """
@@ -42,12 +45,17 @@ class Query:
     deadline: float = math.inf
     warm_start: Motion | None = None
     route: FloatArray | None = None
+    checker: Callable[[Motion], ValidationReport] | None = None
     progress: Progress | None = None
 
     @cached_property
     def geometry(self) -> Geometry | None:
         """Path, beams and corners of the route; None if nothing leads to the goal. Computed once."""
         return survey(self.maze, self.arm.link_radius, self.route)
+
+    def check(self, motion: Motion) -> ValidationReport | None:
+        """Ask the checker about a motion; None if there is none to ask."""
+        return None if self.checker is None else self.checker(motion)
 
     def tell(self, stage: str, share: float) -> None:
         """Report progress."""

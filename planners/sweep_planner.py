@@ -9,11 +9,12 @@ led into a gap that closes; links then become tangent to corners by themselves.
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,14 +23,48 @@ from hrsnake_env.maze import Maze
 from planners.corners import Corner, critical_corners
 from planners.kernels import sweep as kernel
 from planners.kernels.types import FloatArray, IntArray
-from planners.problem import Candidate, Failure, Motion, PlanningStatus
+from planners.problem import Candidate, Failure, Motion, PlanningStatus, ValidationReport
 from planners.query import Query
 from planners.survey import Geometry
 
-__all__ = ["aim_line", "plan_sweep"]
+__all__ = ["Fineness", "Track", "aim_line", "grow", "motion_of", "plan_sweep"]
 
-RESOLUTIONS = (64, 96, 160)
-"""Vertices per link length, tried in this order: the finer ones gain the last percent of length."""
+
+class Fineness(NamedTuple):
+    """Say how finely a track is drawn.
+
+    Parameters
+    ----------
+    per_link : int
+        Vertices per link length.
+    overlap : float
+        As in `planners.kernels.sweep.grow_track`.
+    step : float
+        Largest movement of a joint between poses, in link lengths, where the resolution allows.
+    deviation : float
+        Largest distance of a joint from its chord between poses, in link lengths, likewise.
+    options : int
+        How many other ways are tried at a trouble.
+    """
+
+    per_link: int
+    overlap: float
+    step: float
+    deviation: float
+    options: int
+
+
+FINENESSES = (
+    Fineness(48, 0.9, 0.045, 8e-4, 12),
+    Fineness(96, 0.9, 0.045, 8e-4, 12),
+    Fineness(160, 0.9, 0.045, 8e-4, 100),
+    Fineness(320, 0.9, 0.045, 8e-4, 100),
+)
+"""Tried in this order: the finer ones gain the last percent of length."""
+
+STRICT_OVERLAP, STRICT_STEP, STRICT_DEVIATION = 0.5, 0.02, 3e-4
+"""Of a fineness, once the checker has refused a motion of a coarser one for what is between its poses: so
+sharp corners of walls are passed without a hop."""
 
 MIN_CURVATURE = 0.4
 """Of a corner, times the passage width: half the paper's, so that turns of 40 degrees are seen."""
@@ -55,9 +90,6 @@ SOFTENING = 8.0
 PAD = 3e-4
 """Kept from the walls by every link, in rad about its base-side joint."""
 
-STEP = 0.03
-"""Largest movement of a joint between poses, in link lengths, where the track's resolution allows."""
-
 SEARCH_REACH = 0.5
 """How far the closest path point may move between vertices, in link lengths of arclength."""
 
@@ -70,31 +102,61 @@ VARIANTS = (
     (-0.45, 1.0),
     (0.3, 1.0),
     (-0.15, 0.0),
+    (-0.15, 0.25),
+    (-0.15, 0.75),
 )
 """How a corner is taken: by how many link lengths along the path its aim is displaced, and how far out it
-swings. The first is the default; at a dead end the others are tried at the corner and at the one before."""
+swings, as a share of the way to the wall. At a dead end the others are tried, in this order, at the corner
+and at the one before."""
+
+SWINGS = (7, 8, 4, 9)
+"""The variants that swing the least, in order: where links that follow the aim meet no wall, that is how a
+corner is taken first; otherwise it is the first of the variants."""
 
 MAX_ATTEMPTS = 150
-"""Tracks that are tried at one resolution."""
+"""Tracks that are tried at one fineness."""
 
 MAX_VERTICES = 600_000
-"""Vertices that all tracks of one resolution may have together: a few seconds of work."""
+"""Vertices that all tracks of one fineness may have together: a few seconds of work."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class _Track:
-    """Hold a joint track, as `planners.kernels.sweep.grow_track` fills it."""
+class Track:
+    """Hold a joint track, as `planners.kernels.sweep.grow_track` fills it.
 
-    per_link: int
+    The arrays have room for more than its n vertices.
+    """
+
+    fineness: Fineness
     n: int
     ending: int
+    aim: FloatArray
     points: FloatArray
     start: IntArray
-    index: int
+    headings: FloatArray
+    indices: IntArray
+    credits: FloatArray
+    waits: IntArray
+    first: IntArray
+    gaps: FloatArray
 
     @property
     def reached(self) -> bool:
+        """Whether it ends at the goal."""
         return self.ending == kernel.GOAL
+
+    @property
+    def index(self) -> int:
+        """Index of the path point closest to its end."""
+        return int(self.indices[self.n - 1])
+
+    @property
+    def chain(self) -> FloatArray:
+        """The arm with its tip at the end of the track, tip first, shape (n_joints, 2)."""
+        vertices = [self.n - 1]
+        while vertices[-1] > self.fineness.per_link:
+            vertices.append(int(self.start[vertices[-1]]))
+        return self.points[vertices]
 
 
 def plan_sweep(query: Query) -> Candidate:
@@ -103,38 +165,22 @@ def plan_sweep(query: Query) -> Candidate:
     Parameters
     ----------
     query : Query
-        Maze, arm and terms.
+        Maze, arm and terms; a warm start is not used.
 
     Returns
     -------
     candidate : Candidate
-        A motion with as many links as it needs, not yet validated, or the reason why there is none.
+        A motion with as many links as it needs, or the reason why there is none.
     """
-    maze, arm, geometry = query.maze, query.arm, query.geometry
-    if geometry is None:
+    if query.geometry is None:
         return query.no_path()
-    clock = [time.perf_counter()]
-    track = _best_track(geometry, query)
-    clock.append(time.perf_counter())
+    search = _Search(query, query.geometry)
+    motion = search.run()
     query.tell("plan", 1.0)
-    if not track.reached:
-        x, y = (float(value) for value in track.points[track.n - 1])
-        why = (
-            "the joint track has grown out of all proportion to the path"
-            if track.ending == kernel.FULL
-            else "no direction of its link stays free during the next link length of feed"
-        )
-        return Candidate(
-            status=PlanningStatus.DEAD_END,
-            reason=f"With the tip at ({x:.1f}, {y:.1f}) {maze.units}, {why}, in every way tried to take the "
-            f"corners before it.",
-            failure=Failure(place=(x, y)),
-            timings={**geometry.timings, "plan": clock[1] - clock[0]},
-        )
-    motion = _motion(track, arm.link_length, maze)
-    clock.append(time.perf_counter())
-    stages = dict(zip(("plan", "poses"), np.diff(clock).tolist(), strict=True))
-    return Candidate(status=PlanningStatus.SOLVED, motion=motion, timings={**geometry.timings, **stages})
+    timings = {**query.geometry.timings, **search.seconds}
+    if motion is not None:
+        return Candidate(status=PlanningStatus.SOLVED, motion=motion, timings=timings)
+    return _failed(query, query.geometry, search.best, timings)
 
 
 def aim_line(
@@ -176,65 +222,149 @@ def aim_line(
     return path.points + (lateral * outer)[:, None] * beams.normals
 
 
-def _best_track(geometry: Geometry, query: Query) -> _Track:
-    """Return the first track that reaches the goal, or else the one that came farthest."""
-    best: _Track | None = None
-    for number, per_link in enumerate(RESOLUTIONS):
-        for attempt, track in enumerate(_attempts(geometry, query.arm, per_link)):
-            query.tell("plan", (number + attempt / MAX_ATTEMPTS) / len(RESOLUTIONS))
-            if track.reached:
-                return track
-            if best is None or track.index > best.index:
-                best = track
-    assert best is not None  # every resolution makes at least one attempt
-    return best
+class _Search:
+    """Grow tracks, at each trouble with other ways to take the corners before it, until one is accepted."""
 
+    def __init__(self, query: Query, geometry: Geometry) -> None:
+        self.query, self.geometry = query, geometry
+        self.corners = critical_corners(geometry.path, geometry.beams, MIN_CURVATURE, MAX_INNER_BEAM)
+        self.best: Track | None = None
+        self.refused: Motion | None = None
+        self.seconds = {"plan": 0.0, "poses": 0.0}
 
-def _attempts(geometry: Geometry, arm: ArmSpec, per_link: int) -> Iterator[_Track]:
-    """Yield tracks: the default first, and at each dead end other ways to take the corners before it."""
-    corners = critical_corners(geometry.path, geometry.beams, MIN_CURVATURE, MAX_INNER_BEAM)
-    chosen = [0] * len(corners)
-    track = _grow(geometry, arm, per_link, corners, chosen)
-    yield track
-    left, work = MAX_ATTEMPTS - 1, track.n
-    while corners and not track.reached:
-        farther = None
-        at = min(range(len(corners)), key=lambda k: _distance_in_indices(corners[k], track.index))
+    def run(self) -> Motion | None:
+        """Return a motion that the checker accepts; otherwise the last one that it refused, or None."""
+        chosen, strict = self._least_swings(), False
+        for number, fineness in enumerate(FINENESSES):
+            if strict:
+                fineness = fineness._replace(
+                    overlap=STRICT_OVERLAP, step=STRICT_STEP, deviation=STRICT_DEVIATION
+                )
+            self.left, self.work, self.share = MAX_ATTEMPTS, MAX_VERTICES, number / len(FINENESSES)
+            track = self._grow(fineness, chosen, None)
+            while True:
+                trouble, again = track.index, False
+                if track.reached:
+                    motion, report = self._checked(track)
+                    if report is None or report.valid:
+                        return motion
+                    trouble, again = self._nearest_index(report), True
+                    if report.faults[0].kind != "crossing":
+                        strict = True
+                        break
+                found = self._other_way(track, chosen, trouble, again)
+                if found is None:
+                    break
+                track, chosen = found
+            if self.query.late:
+                break
+        return self.refused
+
+    def _least_swings(self) -> list[int]:
+        """Choose for each corner the least swing at which links that follow the aim meet no wall."""
+        chosen = [0] * len(self.corners)
+        length, path = float(self.query.arm.link_length), self.geometry.path
+        blocked = np.empty(len(path.s), dtype=np.bool_)
+        for variant in reversed(SWINGS):
+            line = aim_line(self.geometry, self.corners, [VARIANTS[variant]] * len(chosen), length)
+            kernel.blocked_chords(line, length, self.geometry.maze.walls, blocked)
+            for k, corner in enumerate(self.corners):
+                begin = int(np.searchsorted(path.s, path.s[corner.first] - length))
+                if not blocked[begin : corner.last + 1].any():
+                    chosen[k] = variant
+        return chosen
+
+    def _other_way(
+        self, track: Track, chosen: list[int], trouble: int, whole: bool
+    ) -> tuple[Track, list[int]] | None:
+        """Find a track that gets past the trouble (if `whole`, to the goal) by other ways at its corners."""
+        if not self.corners:
+            return None
+        at = min(range(len(self.corners)), key=lambda k: _distance_in_indices(self.corners[k], trouble))
         pair = [k for k in (at - 1, at) if k >= 0]
         options = itertools.product(range(len(VARIANTS)), repeat=len(pair))
-        for option in sorted(options, key=sum):
-            if left == 0 or work > MAX_VERTICES:
-                return
+        for option in sorted(options, key=sum)[: track.fineness.options]:
+            if self.left == 0 or self.work <= 0 or self.query.late:
+                return None
             tried = list(chosen)
             for k, value in zip(pair, option, strict=True):
                 tried[k] = value
             if tried == chosen:
                 continue
-            other = _grow(geometry, arm, per_link, corners, tried)
-            left, work = left - 1, work + other.n
-            yield other
-            if other.index > max(track.index, corners[at].last):
-                farther = (other, tried)
-                break
-        if farther is None:
-            return
-        track, chosen = farther
+            other = self._grow(track.fineness, tried, track)
+            if other.reached or (not whole and other.index > max(trouble, self.corners[at].last)):
+                return other, tried
+        return None
+
+    def _grow(self, fineness: Fineness, chosen: list[int], earlier: Track | None) -> Track:
+        """Grow a track, from where its aim begins to differ from that of an earlier one."""
+        clock = time.perf_counter()
+        aim = aim_line(
+            self.geometry,
+            self.corners,
+            [VARIANTS[k] for k in chosen],
+            float(self.query.arm.link_length),
+        )
+        track = grow(self.geometry, self.query.arm, fineness, aim, earlier)
+        self.left, self.work = self.left - 1, self.work - track.n
+        if self.best is None or track.index > self.best.index:
+            self.best = track
+        self.seconds["plan"] += time.perf_counter() - clock
+        self.query.tell("plan", self.share + (1.0 - self.left / MAX_ATTEMPTS) / len(FINENESSES))
+        return track
+
+    def _checked(self, track: Track) -> tuple[Motion, ValidationReport | None]:
+        clock = time.perf_counter()
+        self.refused = motion = motion_of(track, self.query.arm.link_length, self.query.maze)
+        self.seconds["poses"] += time.perf_counter() - clock
+        return motion, self.query.check(motion)
+
+    def _nearest_index(self, report: ValidationReport) -> int:
+        away = self.geometry.path.points - np.asarray(report.faults[0].place)
+        return int(np.argmin(np.hypot(*away.T)))
 
 
 def _distance_in_indices(corner: Corner, index: int) -> int:
     return max(corner.first - index, index - corner.last, 0)
 
 
-def _grow(
-    geometry: Geometry, arm: ArmSpec, per_link: int, corners: list[Corner], chosen: list[int]
-) -> _Track:
+def grow(
+    geometry: Geometry, arm: ArmSpec, fineness: Fineness, aim: FloatArray, earlier: Track | None = None
+) -> Track:
+    """Grow a joint track along an aim line.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Path and walls.
+    arm : ArmSpec
+        Link length and joint limit.
+    fineness : Fineness
+        Of the track.
+    aim : array, shape (n, 2)
+        One point for each path point (`aim_line`).
+    earlier : Track, optional
+        Of the same fineness, with another aim: the new track is the same up to where the aims differ.
+    """
     path, length = geometry.path, float(arm.link_length)
     n_lengths = path.length / length
     # Someone in the arm is always moving fast, so vertices grow with links times corners.
-    n_max = int((0.6 * n_lengths**2 + 12.0 * n_lengths + 40.0) * per_link)
-    points, start, headings = np.empty((n_max, 2)), np.empty(n_max, dtype=np.int64), np.empty(n_max)
-    indices, first = np.empty(n_max, dtype=np.int64), np.empty(n_max + 2, dtype=np.int64)
-    n_gaps = 8 * n_max
+    n_max = int((0.6 * n_lengths**2 + 12.0 * n_lengths + 40.0) * fineness.per_link)
+    track = Track(
+        fineness=fineness,
+        n=0,
+        ending=kernel.FULL,
+        aim=aim,
+        points=np.empty((n_max, 2)),
+        start=np.empty(n_max, dtype=np.int64),
+        headings=np.empty(n_max),
+        indices=np.empty(n_max, dtype=np.int64),
+        credits=np.empty(n_max),
+        waits=np.empty(n_max, dtype=np.int64),
+        first=np.empty(n_max + 2, dtype=np.int64),
+        gaps=np.empty((8 * n_max, 2)),
+    )
+    resumed = 0 if earlier is None else _common(track, earlier, path.s, length)
     n, ending = kernel.grow_track(
         length,
         math.inf if arm.joint_limit is None else float(arm.joint_limit),
@@ -243,30 +373,78 @@ def _grow(
         geometry.maze.goal_radius,
         path.points,
         path.length - path.s,
-        aim_line(geometry, corners, [VARIANTS[k] for k in chosen], length),
+        aim,
         max(1, round(SEARCH_REACH * length / path.s[1])),
         geometry.maze.walls,
-        per_link,
+        fineness.per_link,
+        fineness.overlap,
         PAD,
         SOFTENING,
-        points,
-        start,
-        headings,
-        indices,
-        first,
-        np.empty((n_gaps, 2)),
-        np.empty(n_gaps, dtype=np.bool_),
+        resumed,
+        track.points,
+        track.start,
+        track.headings,
+        track.indices,
+        track.credits,
+        track.waits,
+        track.first,
+        track.gaps,
+        np.empty(len(track.gaps), dtype=np.bool_),
     )
-    return _Track(
-        per_link=per_link, n=n, ending=ending, points=points, start=start, index=int(indices[n - 1])
-    )
+    return dataclasses.replace(track, n=n, ending=ending)
 
 
-def _motion(track: _Track, length: float, maze: Maze) -> Motion:
+def _common(track: Track, earlier: Track, s: FloatArray, length: float) -> int:
+    """Copy what a track has in common with an earlier one, and return its number of vertices."""
+    differs = np.flatnonzero((track.aim != earlier.aim).any(axis=1))
+    if not len(differs):
+        return 0
+    # A link looks ahead to where the aim leaves its reach, hardly farther along the path than its end is.
+    begin = s[differs[0]] - length
+    ahead = np.flatnonzero(s[earlier.indices[: earlier.n]] > begin)
+    n = int(ahead[0]) if len(ahead) else earlier.n
+    if n <= 2 * track.fineness.per_link + 1:
+        return 0
+    for name in ("points", "start", "headings", "indices", "credits", "waits"):
+        getattr(track, name)[:n] = getattr(earlier, name)[:n]
+    track.first[: n + 1] = earlier.first[: n + 1]
+    track.gaps[: track.first[n]] = earlier.gaps[: track.first[n]]
+    return n
+
+
+def motion_of(track: Track, length: float, maze: Maze) -> Motion:
+    """Make poses of a track, thinned to the largest step of its fineness."""
+    per_link, step = track.fineness.per_link, track.fineness.step * length
     kept = np.empty(track.n, dtype=np.int64)
-    n_kept = kernel.thin_track(track.n, track.points, track.start, track.per_link, STEP * length, kept)
+    most = 8.0 * track.fineness.deviation
+    n_kept = kernel.thin_track(track.n, track.points, track.start, track.headings, per_link, step, most, kept)
     kept = kept[:n_kept]
-    n_links = max(1, kernel.chain_length(int(kept[-1]), track.start, track.per_link))
+    n_links = max(1, kernel.chain_length(int(kept[-1]), track.start, per_link))
     joints = np.empty((n_kept, n_links + 1, 2))
-    kernel.pose_joints(kept, track.points, track.start, track.per_link, length, maze.base_pose, joints)
+    kernel.pose_joints(kept, track.points, track.start, per_link, length, maze.base_pose, joints)
     return Motion.from_joints(joints, length, maze.base_pose)
+
+
+def _failed(query: Query, geometry: Geometry, track: Track | None, timings: dict[str, float]) -> Candidate:
+    assert track is not None  # every search grows at least one track
+    x, y = (float(value) for value in track.points[track.n - 1])
+    status, why = (
+        PlanningStatus.DEAD_END,
+        "no direction of its link stays free during the next link length of feed",
+    )
+    if track.ending == kernel.FULL:
+        why = "the joint track has grown out of all proportion to the path"
+    if query.late:
+        status, why = PlanningStatus.OUT_OF_TIME, "time was over"
+    return Candidate(
+        status=status,
+        reason=f"With the tip at ({x:.1f}, {y:.1f}) {query.maze.units}, {why}, "
+        f"in every way tried to take the corners before it.",
+        failure=Failure(
+            place=(x, y),
+            path_position=float(geometry.path.s[track.index]),
+            link=0,
+            joints=track.chain[::-1],
+        ),
+        timings=timings,
+    )

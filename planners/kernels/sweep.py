@@ -20,11 +20,6 @@ TWO_PI = 2.0 * np.pi
 GOAL, DEAD_END, FULL = 0, 1, 2
 """How a track ends: at the goal; where no direction stays free during the next link length of feed; full."""
 
-OVERLAP = 0.9
-"""Intervals at neighbouring vertices count as joined within this part of the largest turn between them. More
-would let a link hop over a thin wall; exact overlap loses length, as thin intervals drift faster than they
-are wide."""
-
 FASTEST = 1.9
 """Largest movement of the tip from vertex to vertex, in steps. Starts that go several vertices at once move
 at most one step, so that there is room to turn meanwhile."""
@@ -229,6 +224,48 @@ def _turn_range(
 
 
 @njit(cache=True)
+def _lay_axis(
+    per_link: int,
+    joint_limit: float,
+    base_pose: FloatArray,
+    length: float,
+    points: FloatArray,
+    rest: FloatArray,
+    reach: int,
+    walls: FloatArray,
+    pad: float,
+    track: FloatArray,
+    start: IntArray,
+    headings: FloatArray,
+    indices: IntArray,
+    first: IntArray,
+    gaps: FloatArray,
+    viable: BoolArray,
+    blocked: FloatArray,
+    found: FloatArray,
+) -> bool:
+    """Fill the vertices on the feeder's axis, to one link length in front of the base."""
+    index, step = 0, length / per_link
+    first[0] = 0
+    for i in range(2 * per_link + 1):
+        along = (i - per_link) * step
+        track[i, 0] = base_pose[0] + along * np.cos(base_pose[2])
+        track[i, 1] = base_pose[1] + along * np.sin(base_pose[2])
+        start[i] = i - per_link
+        headings[i] = base_pose[2]
+        first[i + 1] = first[i]
+        if i >= per_link:
+            index = closest_index(points, track[i, 0], track[i, 1], index, reach)
+            if not _add_gaps(
+                i, track, base_pose[2], joint_limit, rest[index] < length, length, walls, pad, first, gaps,
+                viable, blocked, found,
+            ):  # fmt: skip
+                return False
+        indices[i] = index
+    return True
+
+
+@njit(cache=True)
 def grow_track(
     length: float,
     joint_limit: float,
@@ -241,12 +278,16 @@ def grow_track(
     reach: int,
     walls: FloatArray,
     per_link: int,
+    overlap: float,
     pad: float,
     softening: float,
+    resumed: int,
     track: FloatArray,
     start: IntArray,
     headings: FloatArray,
     indices: IntArray,
+    credits: FloatArray,
+    waits: IntArray,
     first: IntArray,
     gaps: FloatArray,
     viable: BoolArray,
@@ -277,14 +318,24 @@ def grow_track(
         Wall segments.
     per_link : int
         Vertices per link length; the largest turn from vertex to vertex is one over it, in rad.
+    overlap : float
+        Intervals at neighbouring vertices count as joined within this part of the largest turn between them.
+        Much of it lets a link hop over a thin wall; exact overlap loses length, as thin intervals drift
+        faster than they are wide.
     pad : float
         Kept from the walls, in rad.
     softening : float
         Turn in place that a link length of feed allows, in rad.
+    resumed : int
+        Number of vertices of the arrays that are filled already, by a run that differs from here on; 0 for
+        none, otherwise more than the straight ones.
     track : array, shape (n_max, 2)
         Filled with the vertices: first the axis from a link length behind the base to one in front of it.
     start, headings, indices : array, shape (n_max,)
         Filled for each vertex: where its link starts, its heading, the closest path point.
+    credits, waits : array, shape (n_max,)
+        Filled for each vertex: the turn in place that is saved up there, in rad, and for how many vertices
+        the feed has waited.
     first : array, shape (n_max + 2,)
         Filled: place of each vertex's first free interval in `gaps`.
     gaps : array, shape (n_gaps_max, 2)
@@ -298,32 +349,26 @@ def grow_track(
         Number of vertices, and one of GOAL, DEAD_END and FULL.
     """
     step, turn = length / per_link, 1.0 / per_link
-    slack = OVERLAP * turn
+    slack = overlap * turn
     straight = 2 * per_link
     most = walls.shape[0] + 1
     blocked, found = np.empty((most, 2)), np.empty((most, 2))
     reached, reached_next = np.zeros(most, dtype=np.bool_), np.zeros(most, dtype=np.bool_)
     turns = np.array([0.0, 1.0, -1.0, 0.5, -0.5, 0.25, -0.25])
-    index = 0
-    first[0] = 0
-    for i in range(straight + 1):
-        along = (i - per_link) * step
-        track[i, 0] = base_pose[0] + along * np.cos(base_pose[2])
-        track[i, 1] = base_pose[1] + along * np.sin(base_pose[2])
-        start[i] = i - per_link
-        headings[i] = base_pose[2]
-        first[i + 1] = first[i]
-        if i >= per_link:
-            index = closest_index(points, track[i, 0], track[i, 1], index, reach)
-            if not _add_gaps(
-                i, track, base_pose[2], joint_limit, rest[index] < length, length, walls, pad, first, gaps,
-                viable, blocked, found,
-            ):  # fmt: skip
-                return i, FULL
-        indices[i] = index
-    _prune(per_link, straight, first, gaps, viable, slack, True)
-    n, s, heading, credit = straight + 1, per_link, base_pose[2], 0.0
-    last_distance, waited = np.inf, 0
+    if resumed == 0:
+        n = straight + 1
+        if not _lay_axis(
+            per_link, joint_limit, base_pose, length, points, rest, reach, walls, pad, track, start, headings,
+            indices, first, gaps, viable, blocked, found,
+        ):  # fmt: skip
+            return n, FULL
+        credits[:n], waits[:n] = 0.0, 0
+    else:
+        n = resumed
+    s, heading, credit, waited = start[n - 1], headings[n - 1], credits[n - 1], waits[n - 1]
+    viable[first[s] : first[n]] = True
+    _prune(s, n - 1, first, gaps, viable, slack, True)
+    last_distance = np.inf
     while n < track.shape[0]:
         distance = np.hypot(track[n - 1, 0] - goal[0], track[n - 1, 1] - goal[1])
         if distance <= 0.5 * goal_radius:
@@ -407,20 +452,44 @@ def grow_track(
         if not in_place:
             moved = np.hypot(track[origin, 0] - track[s, 0], track[origin, 1] - track[s, 1])
             credit = min(credit + softening * moved / length, MOST_CREDIT)
-        start[n], headings[n], indices[n] = origin, new, index
+        start[n], headings[n], indices[n], credits[n], waits[n] = origin, new, index, credit, waited
         s, heading = origin, new
         n += 1
     return n, FULL
 
 
 @njit(cache=True)
-def thin_track(
-    n: int, track: FloatArray, start: IntArray, per_link: int, largest: float, kept: IntArray
-) -> int:
-    """Choose tip vertices for poses so that no joint moves farther than `largest` from pose to pose.
+def _chain_may_turn(a: int, b: int, start: IntArray, headings: FloatArray, half: int, most: float) -> bool:
+    """Tell whether the squared turns of all links, with the tip going from vertex a to b, sum up to `most`.
 
-    Any choice is a motion of exact chords. The poses in which a joint is just at the base, and its link still
-    straight, are kept: the feeder's rule needs them.
+    With linear joint angles in between, joints leave their chords by at most an eighth of that sum, in link
+    lengths.
+    """
+    total = 0.0
+    while b > half and a != b:
+        total += (headings[b] - headings[max(a, 0)]) ** 2
+        if total > most:
+            return False
+        a, b = start[max(a, 0)], start[b]
+    return True
+
+
+@njit(cache=True)
+def thin_track(
+    n: int,
+    track: FloatArray,
+    start: IntArray,
+    headings: FloatArray,
+    per_link: int,
+    largest: float,
+    most: float,
+    kept: IntArray,
+) -> int:
+    """Choose tip vertices for poses so that no joint moves far from pose to pose.
+
+    Any choice is a motion of exact chords. No joint moves farther than `largest`, and the squared turns of
+    the links sum up to at most `most`, in rad^2. The poses in which a joint is just at the base, and its
+    link still straight, are kept: the feeder's rule needs them.
 
     Returns
     -------
@@ -432,7 +501,11 @@ def thin_track(
     kept[0] = per_link
     while at < n - 1:
         step = at + 1
-        while step + 1 < n and _chain_may_move(at, step + 1, track, start, straight, largest):
+        while (
+            step + 1 < n
+            and _chain_may_move(at, step + 1, track, start, straight, largest)
+            and _chain_may_turn(at, step + 1, start, headings, per_link, most)
+        ):
             step += 1
         kept[n_kept] = step
         n_kept += 1
@@ -481,3 +554,42 @@ def chain_length(vertex: int, start: IntArray, per_link: int) -> int:
         vertex = start[vertex]
         n += 1
     return n
+
+
+@njit(cache=True)
+def blocked_chords(line: FloatArray, length: float, walls: FloatArray, blocked: BoolArray) -> None:
+    """Tell for each point of a line whether a link from it to the line meets a wall.
+
+    It ends at the next place at distance `length`, or near the end, where there is none, at the last point.
+
+    Parameters
+    ----------
+    line : array, shape (n, 2)
+        From base to goal.
+    length : float
+        Of the link.
+    walls : array, shape (n_walls, 2, 2)
+        Segments.
+    blocked : array, shape (n,)
+        Filled.
+    """
+    for i in range(line.shape[0]):
+        px, py = line[i, 0], line[i, 1]
+        hit, heading = direction_to_distance(line, px, py, i, length)
+        qx, qy = line[-1, 0], line[-1, 1]
+        if hit:
+            qx, qy = px + length * np.cos(heading), py + length * np.sin(heading)
+        blocked[i] = False
+        for k in range(walls.shape[0]):
+            ax, ay, bx, by = walls[k, 0, 0], walls[k, 0, 1], walls[k, 1, 0], walls[k, 1, 1]
+            if max(ax, bx) < min(px, qx) or min(ax, bx) > max(px, qx):
+                continue
+            if max(ay, by) < min(py, qy) or min(ay, by) > max(py, qy):
+                continue
+            first = (qx - px) * (ay - py) - (qy - py) * (ax - px)
+            second = (qx - px) * (by - py) - (qy - py) * (bx - px)
+            third = (bx - ax) * (py - ay) - (by - ay) * (px - ax)
+            fourth = (bx - ax) * (qy - ay) - (by - ay) * (qx - ax)
+            if first * second <= 0.0 and third * fourth <= 0.0:
+                blocked[i] = True
+                break
