@@ -13,6 +13,7 @@ import dataclasses
 import itertools
 import math
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -241,24 +242,41 @@ class _Search:
                     overlap=STRICT_OVERLAP, step=STRICT_STEP, deviation=STRICT_DEVIATION
                 )
             self.left, self.work, self.share = MAX_ATTEMPTS, MAX_VERTICES, number / len(FINENESSES)
-            track = self._grow(fineness, chosen, None)
-            while True:
-                trouble, again = track.index, False
-                if track.reached:
-                    motion, report = self._checked(track)
-                    if report is None or report.valid:
-                        return motion
-                    trouble, again = self._nearest_index(report), True
-                    if report.faults[0].kind != "crossing":
-                        strict = True
-                        break
-                found = self._other_way(track, chosen, trouble, again)
-                if found is None:
-                    break
-                track, chosen = found
+            track, chosen = self._reach(fineness, chosen)
+            if track.reached:
+                motion, report = self._checked(track)
+                if report is None or report.valid:
+                    return motion
+                if strict or report.faults[0].kind == "crossing":
+                    for other, _ in self._other_ways(track, chosen, self._nearest_index(report)):
+                        if other.reached:
+                            motion, report = self._checked(other)
+                            if report is None or report.valid:
+                                return motion
+                strict = strict or (report is not None and report.faults[0].kind != "crossing")
             if self.query.late:
                 break
         return self.refused
+
+    def gets_past(self, s: float, fineness: Fineness) -> bool:
+        """Tell whether a track gets beyond a place on the path, s in maze units from the base."""
+        self.left, self.work, self.share = MAX_ATTEMPTS, MAX_VERTICES, 0.0
+        track, _ = self._reach(fineness, self._least_swings())
+        return track.reached or bool(self.geometry.path.s[track.index] > s)
+
+    def _reach(self, fineness: Fineness, chosen: list[int]) -> tuple[Track, list[int]]:
+        """Grow tracks until one reaches the goal or no other way gets farther; return it and its ways."""
+        track = self._grow(fineness, chosen, None)
+        while not track.reached:
+            trouble = track.index
+            for other, tried in self._other_ways(track, chosen, trouble):
+                last = self.corners[self._nearest_corner(trouble)].last
+                if other.reached or other.index > max(trouble, last):
+                    track, chosen = other, tried
+                    break
+            else:
+                break
+        return track, chosen
 
     def _least_swings(self) -> list[int]:
         """Choose for each corner the least swing at which links that follow the aim meet no wall."""
@@ -274,27 +292,27 @@ class _Search:
                     chosen[k] = variant
         return chosen
 
-    def _other_way(
-        self, track: Track, chosen: list[int], trouble: int, whole: bool
-    ) -> tuple[Track, list[int]] | None:
-        """Find a track that gets past the trouble (if `whole`, to the goal) by other ways at its corners."""
+    def _other_ways(self, track: Track, chosen: list[int], trouble: int) -> Iterator[tuple[Track, list[int]]]:
+        """Grow tracks that take the corner nearest to the trouble, and the one before it, in other ways."""
         if not self.corners:
-            return None
-        at = min(range(len(self.corners)), key=lambda k: _distance_in_indices(self.corners[k], trouble))
+            return
+        at = self._nearest_corner(trouble)
         pair = [k for k in (at - 1, at) if k >= 0]
         options = itertools.product(range(len(VARIANTS)), repeat=len(pair))
         for option in sorted(options, key=sum)[: track.fineness.options]:
             if self.left == 0 or self.work <= 0 or self.query.late:
-                return None
+                return
             tried = list(chosen)
             for k, value in zip(pair, option, strict=True):
                 tried[k] = value
-            if tried == chosen:
-                continue
-            other = self._grow(track.fineness, tried, track)
-            if other.reached or (not whole and other.index > max(trouble, self.corners[at].last)):
-                return other, tried
-        return None
+            if tried != chosen:
+                yield self._grow(track.fineness, tried, track), tried
+
+    def _nearest_corner(self, index: int) -> int:
+        return min(
+            range(len(self.corners)),
+            key=lambda k: max(self.corners[k].first - index, index - self.corners[k].last, 0),
+        )
 
     def _grow(self, fineness: Fineness, chosen: list[int], earlier: Track | None) -> Track:
         """Grow a track, from where its aim begins to differ from that of an earlier one."""
@@ -322,10 +340,6 @@ class _Search:
     def _nearest_index(self, report: ValidationReport) -> int:
         away = self.geometry.path.points - np.asarray(report.faults[0].place)
         return int(np.argmin(np.hypot(*away.T)))
-
-
-def _distance_in_indices(corner: Corner, index: int) -> int:
-    return max(corner.first - index, index - corner.last, 0)
 
 
 def grow(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from planners.kernels.rod import free_directions, nearest_gap
+from planners.kernels.rod import WHOLE_TURN, free_directions, nearest_gap
 from planners.kernels.types import FloatArray, IntArray
 
 TWO_PI = 2.0 * np.pi
@@ -153,6 +153,8 @@ def clamp_to_free(
     if n_gaps == 0:
         return False, direction
     start, end = nearest_gap(direction, gaps, n_gaps)
+    if end - start >= WHOLE_TURN:  # nothing is in the way, and the ends of the interval mean nothing
+        return True, wanted
     return True, min(max(wanted, start), end)
 
 

@@ -9,6 +9,9 @@ from planners.kernels.types import FloatArray
 
 TWO_PI = 2.0 * np.pi
 
+WHOLE_TURN = TWO_PI - 1e-9
+"""An interval of at least this extent is all directions."""
+
 
 @njit(cache=True)
 def _blocked_by_wall(

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from planners.kernels.beam import closest_index, direction_to_distance
-from planners.kernels.rod import free_directions
+from planners.kernels.rod import WHOLE_TURN, free_directions
 from planners.kernels.types import BoolArray, FloatArray, IntArray
 
 TWO_PI = 2.0 * np.pi
@@ -80,7 +80,12 @@ def _nearest_viable(
 
 @njit(cache=True)
 def _into(direction: float, near: float, start: float, end: float) -> float:
-    """Clamp a direction into an interval, moved by whole turns so that it is beside `near`."""
+    """Clamp a direction into an interval, moved by whole turns so that it is beside `near`.
+
+    Where nothing is in the way, the interval is a whole turn, and its ends mean nothing.
+    """
+    if end - start >= WHOLE_TURN:
+        return direction
     turns = TWO_PI * np.round((near - 0.5 * (start + end)) / TWO_PI)
     clamped: float = min(max(direction, start + turns), end + turns)
     return clamped
@@ -191,6 +196,8 @@ def _add_gaps(
     place = first[n]
     for k in range(n_found):
         begin, end = found[k, 0], found[k, 1]
+        if end - begin >= WHOLE_TURN:
+            begin, end = heading - np.pi, heading + np.pi
         if joint_limit < np.pi and not free:
             turns = TWO_PI * np.round((heading - 0.5 * (begin + end)) / TWO_PI)
             begin = max(begin + turns, heading - joint_limit)
