@@ -2,19 +2,35 @@
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
+import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+
+import numpy as np
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners.beam_planner import plan_beam
-from planners.problem import Candidate, Failure, Motion, PlanningResult, PlanningStatus, Progress
+from planners.obstruction import wall_nearest_to
+from planners.problem import (
+    Attempt,
+    Candidate,
+    Failure,
+    Motion,
+    PlanningResult,
+    PlanningStatus,
+    Progress,
+    ValidationReport,
+)
 from planners.query import Query
-from planners.sweep_planner import plan_sweep
+from planners.routes import routes, signature
+from planners.sweep_planner import longest_past, plan_sweep
 from planners.validation import validate
 
-__all__ = ["PLANNERS", "plan"]
+__all__ = ["PLANNERS", "TIME_BUDGET", "plan"]
 
 PLANNERS: dict[str, Callable[[Query], Candidate]] = {
     "beam": plan_beam,
@@ -22,12 +38,28 @@ PLANNERS: dict[str, Callable[[Query], Candidate]] = {
 }
 """All planners by name."""
 
-AUTO = ("sweep", "beam")
-"""The planners that `auto` tries, in this order, until one has a motion that passes the checker."""
+FIRST = ("sweep", "track", "beam")
+"""The planners that `auto` tries first, in this order, until one has a motion that passes the checker."""
+
+THEN = ("sweep", "track")
+"""The planners that `auto` tries on each further way round the obstacles."""
+
+MAX_ROUTES = 12
+"""Ways round the obstacles that `auto` tries, the first one included."""
+
+TIME_BUDGET = 60.0
+"""Seconds that planning may take by default."""
 
 
 def plan(
-    maze: Maze, arm: ArmSpec, planner: str = "auto", *, progress: Progress | None = None
+    maze: Maze,
+    arm: ArmSpec,
+    planner: str = "auto",
+    *,
+    time_budget: float = TIME_BUDGET,
+    warm_start: Motion | None = None,
+    explain: bool = True,
+    progress: Progress | None = None,
 ) -> PlanningResult:
     """Plan a motion of the whole arm from the feeder to the goal, and validate it.
 
@@ -38,7 +70,15 @@ def plan(
     arm : ArmSpec
         The arm. With `n_links` None it gets as many links as the motion needs.
     planner : str
-        `auto` or a key of `PLANNERS`.
+        `auto` or a key of `PLANNERS`. `auto` tries the sweep, then the others, then other ways round the
+        obstacles.
+    time_budget : float
+        In s. What is found by then is returned; the outcome depends on it only if it runs out.
+    warm_start : Motion, optional
+        A motion of links of this length in a similar maze (the goal or a wall has moved): planning starts
+        from it, which takes milliseconds where the change is small.
+    explain : bool
+        Without a plan, find out what is in the way, and the longest link that would pass there.
     progress : callable, optional
         Called with stage and share done.
 
@@ -50,7 +90,8 @@ def plan(
     Raises
     ------
     InputError
-        If the planner is unknown, the arm does not fit the feeder, or has fewer links than the motion needs.
+        If the planner is unknown, the arm does not fit the feeder, the warm start belongs to another base or
+        link length, or the arm has fewer links than the motion needs.
 
     Examples
     --------
@@ -60,37 +101,120 @@ def plan(
     """
     if planner != "auto" and planner not in PLANNERS:
         raise InputError(f"Unknown planner {planner!r}. Available: auto, {', '.join(PLANNERS)}.")
+    if not time_budget > 0.0:
+        raise InputError(f"Expected a positive time_budget in seconds, got {time_budget!r}.")
     maze.check_arm(arm)
+    if warm_start is not None:
+        _check_warm_start(warm_start, maze, arm)
+    deadline = time.perf_counter() + time_budget
+    checker = _Checker(maze, arm, deadline, progress)
+    query = Query(maze=maze, arm=arm, deadline=deadline, checker=checker, progress=progress)
     failures: list[PlanningResult] = []
     shortage: InputError | None = None
-    for name in AUTO if planner == "auto" else (planner,):
+    attempts: list[Attempt] = []
+    for name, route, asked in _questions(query, planner, warm_start, checker):
+        start = time.perf_counter()
         try:
-            result = _plan_with(name, maze, arm, progress)
+            result = _answer(name, asked, checker)
         except InputError as error:  # another planner may need fewer links
             shortage = shortage or error
             continue
+        seconds = time.perf_counter() - start
+        attempts.append(Attempt(planner=name, route=route, status=result.status, seconds=seconds))
         if result.solved:
-            return result
+            return dataclasses.replace(result, attempts=tuple(attempts))
         failures.append(result)
+        if query.late or (route and shortage):
+            break
     if shortage is not None:
         raise shortage
-    return failures[0]
+    first = dataclasses.replace(failures[0], attempts=tuple(attempts))
+    return _explained(first, query) if explain else first
 
 
-def _plan_with(name: str, maze: Maze, arm: ArmSpec, progress: Progress | None) -> PlanningResult:
-    candidate = PLANNERS[name](Query(maze=maze, arm=arm, progress=progress))
-    if candidate.motion is None:
+def _questions(
+    query: Query, planner: str, warm_start: Motion | None, checker: _Checker
+) -> Iterator[tuple[str, int, Query]]:
+    """Yield which planner to ask, on which way round the obstacles (0: the potential's), and the query."""
+    if warm_start is not None and "track" in PLANNERS:
+        name = "track" if planner == "auto" else planner
+        yield name, 0, dataclasses.replace(query, warm_start=warm_start)
+    if planner != "auto":
+        if warm_start is None:
+            yield planner, 0, query
+        return
+    for name in (name for name in FIRST if name in PLANNERS):
+        # What the sweep drew and the checker refused is a good start for shaping the whole track.
+        hint = checker.refused if name == "track" else None
+        yield name, 0, query if hint is None else dataclasses.replace(query, warm_start=hint)
+    if query.geometry is None:
+        return
+    known = {signature(query.geometry.maze, query.geometry.path.points)}
+    ways = routes(query.maze, query.arm.link_length, link_radius=query.arm.link_radius)
+    number = 0
+    for way in itertools.islice(ways, MAX_ROUTES):
+        if way.signature not in known:
+            known.add(way.signature)
+            number += 1
+            for name in (name for name in THEN if name in PLANNERS):
+                yield name, number, dataclasses.replace(query, route=way.points)
+
+
+class _Late(Exception):
+    """Raised by the checker when time is over."""
+
+
+class _Checker:
+    """The exact checker for one query; remembers what it said last."""
+
+    def __init__(self, maze: Maze, arm: ArmSpec, deadline: float, progress: Progress | None) -> None:
+        self.maze, self.arm, self.deadline, self.progress = maze, arm, deadline, progress
+        self.last: tuple[Motion, ValidationReport] | None = None
+        self.refused: Motion | None = None
+        self.seconds = 0.0
+
+    def __call__(self, motion: Motion) -> ValidationReport:
+        if self.last is not None and self.last[0] is motion:
+            return self.last[1]
+        start = time.perf_counter()
+        try:
+            report = validate(motion, self.maze, self.arm, self._tell)
+        finally:
+            self.seconds += time.perf_counter() - start
+        self.last = (motion, report)
+        if not report.valid:
+            self.refused = motion
+        return report
+
+    def _tell(self, stage: str, share: float) -> None:
+        if time.perf_counter() > self.deadline:
+            raise _Late
+        if self.progress is not None:
+            self.progress(stage, share)
+
+
+def _answer(name: str, query: Query, checker: _Checker) -> PlanningResult:
+    """Ask one planner, and the checker about its motion."""
+    checker.seconds = 0.0
+    try:
+        candidate = PLANNERS[name](query)
+        if candidate.motion is None:
+            return PlanningResult(
+                status=candidate.status,
+                planner=name,
+                reason=candidate.reason,
+                failure=candidate.failure,
+                timings=candidate.timings,
+            )
+        motion = _with_wanted_links(candidate.motion, query.maze, query.arm)
+        report = checker(motion)
+    except _Late:
         return PlanningResult(
-            status=candidate.status,
+            status=PlanningStatus.OUT_OF_TIME,
             planner=name,
-            reason=candidate.reason,
-            failure=candidate.failure,
-            timings=candidate.timings,
+            reason="Time was over before the exact check of a motion was.",
         )
-    motion = _with_wanted_links(candidate.motion, maze, arm)
-    start = time.perf_counter()
-    report = validate(motion, maze, arm, progress)
-    timings = {**candidate.timings, "validate": time.perf_counter() - start}
+    timings = {**candidate.timings, "validate": checker.seconds}
     if report.valid:
         return PlanningResult(
             status=PlanningStatus.SOLVED, planner=name, motion=motion, report=report, timings=timings
@@ -100,10 +224,43 @@ def _plan_with(name: str, maze: Maze, arm: ArmSpec, progress: Progress | None) -
         status=PlanningStatus.NOT_VALID,
         planner=name,
         reason=f"The exact check refused the motion: {fault.message}",
-        failure=None if fault.place is None else Failure(place=fault.place),
+        failure=None
+        if fault.place is None
+        else Failure(
+            place=fault.place,
+            link=None if fault.link is None else motion.n_links - 1 - fault.link,
+            wall=wall_nearest_to(query.maze, fault.place),
+            depth=fault.amount if fault.kind in ("penetration", "sweep") else None,
+            joints=motion.joints[fault.pose],
+        ),
         report=report,
         timings=timings,
     )
+
+
+def _explained(result: PlanningResult, query: Query) -> PlanningResult:
+    """Add the longest link that would pass where planning ended."""
+    failure, geometry = result.failure, query.geometry
+    if failure is None or geometry is None or query.late:
+        return result
+    s = failure.path_position
+    if s is None:
+        s = float(geometry.path.s[np.argmin(np.hypot(*(geometry.path.points - failure.place).T))])
+        failure = dataclasses.replace(failure, path_position=s)
+    return dataclasses.replace(
+        result,
+        failure=failure,
+        longest_there=longest_past(query, min(s + query.arm.link_length, geometry.path.length)),
+    )
+
+
+def _check_warm_start(motion: Motion, maze: Maze, arm: ArmSpec) -> None:
+    motion.check_maze(maze)
+    if not math.isclose(motion.link_length, arm.link_length, rel_tol=1e-9):
+        raise InputError(
+            f"Expected a warm start with links of {arm.link_length:g} {maze.units}, got one with links of "
+            f"{motion.link_length:g}."
+        )
 
 
 def _with_wanted_links(motion: Motion, maze: Maze, arm: ArmSpec) -> Motion:

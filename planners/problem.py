@@ -19,6 +19,7 @@ from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
 
 __all__ = [
+    "Attempt",
     "Candidate",
     "Failure",
     "Fault",
@@ -333,6 +334,32 @@ class Candidate:
     timings: Mapping[str, float] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Attempt:
+    """Say how one planner fared on one way round the obstacles.
+
+    Parameters
+    ----------
+    planner : str
+        Its name.
+    route : int
+        0 for the way of the potential, otherwise the number of the way.
+    status : PlanningStatus
+        Its outcome.
+    seconds : float
+        Time that it took, check included.
+    """
+
+    planner: str
+    route: int
+    status: PlanningStatus
+    seconds: float
+
+    def __str__(self) -> str:
+        way = f" on way {self.route}" if self.route else ""
+        return f"{self.planner}{way}: {self.status}"
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PlanningResult:
     """Hold what a planner found, or why it found nothing.
@@ -353,8 +380,10 @@ class PlanningResult:
         The longest link with which the planner gets past that place; None if not looked for.
     report : ValidationReport or None
         What the checker said of the motion that was tried.
+    attempts : tuple of Attempt
+        All planners that were asked, in order.
     timings : mapping from str to float
-        Seconds by stage: potential, path, beams, plan, poses, validate.
+        Seconds by stage of `planner`: potential, path, beams, plan, poses, validate.
     """
 
     status: PlanningStatus
@@ -364,6 +393,7 @@ class PlanningResult:
     failure: Failure | None = None
     longest_there: float | None = None
     report: ValidationReport | None = None
+    attempts: tuple[Attempt, ...] = ()
     timings: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -393,5 +423,6 @@ class PlanningResult:
             "longest_there": self.longest_there,
             "n_poses": None if self.motion is None else self.motion.n_poses,
             "n_links": None if self.motion is None else self.motion.n_links,
+            "attempts": [str(attempt) for attempt in self.attempts],
             "timings": dict(self.timings),
         }

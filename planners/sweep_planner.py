@@ -24,11 +24,12 @@ from hrsnake_env.maze import Maze
 from planners.corners import Corner, critical_corners
 from planners.kernels import sweep as kernel
 from planners.kernels.types import FloatArray, IntArray
+from planners.obstruction import deepest_chord, wall_nearest_to
 from planners.problem import Candidate, Failure, Motion, PlanningStatus, ValidationReport
 from planners.query import Query
 from planners.survey import Geometry
 
-__all__ = ["Fineness", "Track", "aim_line", "grow", "motion_of", "plan_sweep"]
+__all__ = ["Fineness", "Track", "aim_line", "grow", "longest_past", "motion_of", "plan_sweep"]
 
 
 class Fineness(NamedTuple):
@@ -113,6 +114,9 @@ and at the one before."""
 SWINGS = (7, 8, 4, 9)
 """The variants that swing the least, in order: where links that follow the aim meet no wall, that is how a
 corner is taken first; otherwise it is the first of the variants."""
+
+LONGEST_STEPS, LONGEST_RATIO = 220, 0.995
+"""How far down, and how finely, the longest link past a place is looked for."""
 
 MAX_ATTEMPTS = 150
 """Tracks that are tried at one fineness."""
@@ -439,9 +443,39 @@ def motion_of(track: Track, length: float, maze: Maze) -> Motion:
     return Motion.from_joints(joints, length, maze.base_pose)
 
 
+def longest_past(query: Query, s: float) -> float | None:
+    """Find the longest link that the sweep brings beyond a place on the path.
+
+    Parameters
+    ----------
+    query : Query
+        Whose arm has links too long for it.
+    s : float
+        Arclength of the place along the path, in maze units.
+
+    Returns
+    -------
+    length : float or None
+        To half a percent; None if there is none of at least a third of the arm's, or time ran out.
+    """
+    wanted = float(query.arm.link_length)
+    if query.geometry is None:
+        return None
+    for step in range(1, LONGEST_STEPS):
+        length = wanted * LONGEST_RATIO**step
+        # Lengths that fail may be isolated: the first that passes from above counts, none is skipped.
+        arm = dataclasses.replace(query.arm, link_length=length)
+        if _Search(dataclasses.replace(query, arm=arm), query.geometry).gets_past(s, FINENESSES[1]):
+            return length
+        if query.late:
+            return None
+    return None
+
+
 def _failed(query: Query, geometry: Geometry, track: Track | None, timings: dict[str, float]) -> Candidate:
     assert track is not None  # every search grows at least one track
     x, y = (float(value) for value in track.points[track.n - 1])
+    length, path = float(query.arm.link_length), geometry.path
     status, why = (
         PlanningStatus.DEAD_END,
         "no direction of its link stays free during the next link length of feed",
@@ -450,14 +484,27 @@ def _failed(query: Query, geometry: Geometry, track: Track | None, timings: dict
         why = "the joint track has grown out of all proportion to the path"
     if query.late:
         status, why = PlanningStatus.OUT_OF_TIME, "time was over"
+    begin = int(track.indices[max(track.start[track.n - 1], 0)])
+    end = int(np.searchsorted(path.s, path.s[track.index] + length))
+    obstacle = deepest_chord(geometry.maze, track.aim, begin, min(end, len(path.s) - 1), length)
+    what = ""
+    if obstacle is not None and obstacle.depth is not None:
+        (x_wall, y_wall), units = obstacle.place, query.maze.units
+        what = (
+            f" A link on the way taken there would be {obstacle.depth:.3g} {units} deep in the wall at "
+            f"({x_wall:.1f}, {y_wall:.1f})."
+        )
+        obstacle = dataclasses.replace(obstacle, wall=wall_nearest_to(query.maze, obstacle.place))
     return Candidate(
         status=status,
-        reason=f"With the tip at ({x:.1f}, {y:.1f}) {query.maze.units}, {why}, "
-        f"in every way tried to take the corners before it.",
+        reason=f"With the tip at ({x:.1f}, {y:.1f}) {query.maze.units}, {path.s[track.index]:.1f} along the "
+        f"path, {why}, in every way tried to take the corners before it.{what}",
         failure=Failure(
             place=(x, y),
-            path_position=float(geometry.path.s[track.index]),
+            path_position=float(path.s[track.index]),
             link=0,
+            wall=None if obstacle is None else obstacle.wall,
+            depth=None if obstacle is None else obstacle.depth,
             joints=track.chain[::-1],
         ),
         timings=timings,

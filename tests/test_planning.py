@@ -114,7 +114,7 @@ def test_thick_links_are_planned_between_grown_walls(planner):
     result = plan(fig19(), arm, planner=planner)
     assert result.solved, result.reason
     assert validate(result.motion, fig19(), arm).clearance >= 0.0
-    assert not validate(result.motion, fig19(), ArmSpec(link_length=300.0, link_radius=25.0)).valid
+    assert not validate(result.motion, fig19(), ArmSpec(link_length=300.0, link_radius=80.0)).valid
 
 
 @EVERY
