@@ -15,6 +15,10 @@ from shapely.geometry import LineString, Polygon, box
 from hrsnake_env.arm import ArmSpec, joints_from_configuration
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
+from planners import validation
+from planners.checks.gaps import segment_distances, segment_gaps
+from planners.checks.scene import Scene
+from planners.checks.sieve import SPAN, Sifted, sift
 from planners.problem import Motion
 from planners.validation import FAULTS, PINCH_TOLERANCE, STEP_LIMIT, validate
 
@@ -587,3 +591,157 @@ def test_an_arm_without_a_crossing_fault_is_simple_between_poses():
         only_between += passing
     assert apart > 50
     assert only_between > 5
+
+
+# What is set aside before the exact check, against slow twins
+
+figures = st.integers(-3, 4) | st.floats(-3.0, 4.0).map(lambda figure: round(figure, 6))
+places = st.builds(complex, figures, figures)
+lengths = st.sampled_from([0.0, 1.0, 2.0]) | figures.map(abs)
+
+
+def lines(start, end):
+    """Draw lines between complex numbers, shape (n,)."""
+    return shapely.linestrings(np.stack([[start.real, end.real], [start.imag, end.imag]]).transpose(2, 1, 0))
+
+
+@settings(max_examples=500)
+@given(start=places, end=places, length=lengths)
+def test_distances_of_segments_are_those_of_shapely(start, end, length):
+    wall = LineString([(0.0, 0.0), (length, 0.0)])
+    wanted = lines(np.array([start]), np.array([end]))[0].distance(wall)
+    found = segment_distances((np.array([start]), np.array([end])), np.array([length]))
+    assert found[0] == pytest.approx(wanted, abs=1e-12)
+
+
+def distances_on_the_way(before, after, length, together):
+    """Measure moving segments at many times; both ends at the same time, or each at any time."""
+    share = np.linspace(0.0, 1.0, 101 if together else 21)
+    one, other = (share, share) if together else (axis.ravel() for axis in np.meshgrid(share, share))
+    start, end = (before[k] + part * (after[k] - before[k]) for k, part in ((0, one), (1, other)))
+    return shapely.distance(lines(start, end), LineString([(0.0, 0.0), (length, 0.0)]))
+
+
+def gap_of(before, after, length, together):
+    one = [tuple(np.array([place], dtype=complex) for place in ends) for ends in (before, after)]
+    return float(segment_gaps(*one, np.array([float(length)]), np.array([together]))[0])
+
+
+@settings(max_examples=1000)
+@given(data=st.data(), start=places, end=places, length=lengths, together=st.booleans())
+def test_no_gap_is_larger_than_the_distance_on_the_way(data, start, end, length, together):
+    # An end often stays, so that segments rest, pivot about an end, or move along themselves.
+    way = st.just(0.0) | st.just(end - start) | st.builds(lambda place: place - start, places)
+    before = (start, end)
+    after = (start + data.draw(way), end + data.draw(way))
+    gap = gap_of(before, after, length, together)
+    assert gap <= distances_on_the_way(before, after, length, together).min() + 1e-12
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "length", "at_least"),
+    [
+        ((-1 + 1j, 3 + 1j), (-1 + 1j, 3 + 1j), 2.0, 1.0),  # at rest beside the wall
+        ((0.1j, 2 + 0.1j), (1 + 0.1j, 3 + 0.1j), 2.0, 0.1),  # slides along it
+        ((3 + 1j, 3 + 4j), (4 + 1j, 2.5 + 4j), 2.0, 1.0),  # beside its end
+        ((-2 + 0j, -1 + 0j), (-3 + 0j, -2 + 0j), 2.0, 1.0),  # in line with it
+        ((-0.1 - 1j, -0.1 + 1j), (-0.2 - 1j, 1j), 2.0, 0.04),  # turns about its end
+        (
+            (-0.01 - 2j, -0.01 + 2j),
+            (-0.41 - 2j, 0.37 + 2j),
+            2.0,
+            0.009,
+        ),  # so close that the hull has it inside
+    ],
+)
+def test_segments_that_pass_a_wall_have_a_gap(before, after, length, at_least):
+    gap = gap_of(before, after, length, True)
+    assert at_least <= gap <= distances_on_the_way(before, after, length, True).min() + 1e-12
+
+
+def test_a_wall_inside_the_hull_is_missed_only_by_a_segment_that_turns():
+    before, after, length = (-0.01 - 2j, -0.01 + 2j), (-0.41 - 2j, 0.37 + 2j), 2.0
+    assert gap_of(before, after, length, True) > 0.0 >= gap_of(before, after, length, False)
+
+
+def test_a_pillar_that_a_segment_sweeps_over_leaves_no_gap():
+    for side in ((0.0, 0.4), (0.4j, 0.4), (0.4 + 0.4j, 0.4)):
+        corner, length = side
+        before, after = (-1 - 1j - corner, 1 - 1j - corner), (-1 + 2j - corner, 1 + 2j - corner)
+        assert gap_of(before, after, length, True) <= 0.0
+
+
+def everything(scene, tell):
+    """Set nothing aside: the slow twin of `sift`."""
+    motion, shape = scene.motion, (scene.motion.n_poses, scene.motion.n_links)
+    after = np.minimum(np.arange(shape[0]) + 1, shape[0] - 1)
+    step, first, second = (
+        axis.ravel()
+        for axis in np.meshgrid(*(np.arange(size) for size in (shape[0], *shape[1:] * 2)), indexing="ij")
+    )
+    chosen = (second >= first + 2) & (np.maximum(scene.arc, scene.arc[after])[step, first + 1] > 0.0)
+    joints = joints_from_configuration(motion.feed, motion.joint_angles, motion.link_length, motion.base_pose)
+    return Sifted(
+        lower=np.zeros(shape),
+        outside=np.ones(shape, dtype=bool),
+        open_steps=np.ones(shape, dtype=bool),
+        astray=np.linalg.norm(motion.joints - joints, axis=2).max(axis=1),
+        pairs=[np.stack([step, first, second], axis=1)[chosen]],
+    )
+
+
+def without_sieve(motion, maze, arm):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(validation, "sift", everything)
+        return validate(motion, maze, arm)
+
+
+def assert_sieve_changes_nothing(motion, maze, radius=0.0):
+    arm = ArmSpec(link_length=motion.link_length, link_radius=radius)
+    quick, slow = validate(motion, maze, arm), without_sieve(motion, maze, arm)
+    assert kinds(quick) == kinds(slow)
+    assert (quick.clearance, quick.penetration) == (slow.clearance, slow.penetration)
+    assert quick.faults == slow.faults or "sweep" in kinds(slow)
+
+
+angles_of_a_joint = st.sampled_from([0.0, math.pi / 4, -math.pi / 2, 3.0]) | st.floats(-1.5, 1.5)
+turns_of_a_joint = st.sampled_from([0.0, 0.0, 1e-9, 0.01]) | st.floats(-0.3, 0.3)
+
+
+@settings(max_examples=150)
+@given(
+    angles=st.lists(angles_of_a_joint, min_size=3, max_size=3),
+    turns=st.lists(turns_of_a_joint, min_size=3, max_size=3),
+    feeds=st.tuples(st.floats(0.0, 330.0) | st.just(320.0), st.sampled_from([0.0, 0.0, 1.0, 60.0])),
+    n_poses=st.integers(1, 7),
+    radius=st.sampled_from([0.0, 0.0, 4.0]),
+    astray=st.sampled_from([0.0, 0.0, 1e-8, 1.0]),
+)
+def test_nothing_is_set_aside_that_matters(angles, turns, feeds, n_poses, radius, astray):
+    share = np.linspace(0.0, 1.0, n_poses)
+    joint_angles = np.concatenate([[0.0], angles]) + share[:, None] * np.concatenate([[0.0], turns])
+    motion = Motion.from_configurations(feeds[0] + share * feeds[1], joint_angles, 80.0, PILLARS.base_pose)
+    motion = replace(motion, joints=motion.joints + np.array([0.0, astray]))
+    assert_sieve_changes_nothing(motion, PILLARS, radius)
+
+
+@pytest.mark.parametrize("radius", [0.0, 25.0, 60.0])
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 0.02])
+def test_nothing_is_set_aside_of_a_long_motion_that_matters(radius, noise):
+    maze, motion = bend()
+    assert motion.n_poses > SPAN
+    angles = motion.joint_angles + np.random.default_rng(3).normal(size=motion.joint_angles.shape) * noise
+    motion = sliced(
+        Motion.from_configurations(motion.feed, angles, LENGTH, motion.base_pose), slice(300, None)
+    )
+    assert_sieve_changes_nothing(motion, maze, min(radius, 0.4 * LENGTH))
+
+
+def test_little_is_left_of_a_motion_through_wide_places():
+    maze, motion = bend()
+    sifted = sift(Scene(motion=motion, maze=maze, radius=0.0), lambda stage, share: None)
+    scene = Scene(motion=motion, maze=maze, radius=0.0)
+    in_maze = (scene.arc[:, 1:] > 0.0).sum()
+    assert 0 < (sifted.doubtful(scene) & (scene.arc[:, 1:] > 0.0)).sum() < 0.01 * in_maze
+    assert not sifted.open_steps.any()
+    assert sum(map(len, sifted.pairs)) == 0

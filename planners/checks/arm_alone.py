@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from hrsnake_env.arm import joints_from_configuration
+from hrsnake_env.arm import FloatArray, joints_from_configuration
 from planners.checks.scene import PLACE_SLACK, ROUNDING, Scene, joint_fault, worst_of
 from planners.problem import Fault
 
@@ -25,11 +25,13 @@ def check_lengths(scene: Scene) -> tuple[float, Fault | None]:
     return amount, joint_fault(scene, "length", message, pose, link, amount)
 
 
-def check_consistency(scene: Scene) -> Fault | None:
-    """Check that the joints are where feed and joint angles put them."""
-    motion = scene.motion
-    joints = joints_from_configuration(motion.feed, motion.joint_angles, motion.link_length, motion.base_pose)
-    amount, pose, joint = worst_of(np.linalg.norm(motion.joints - joints, axis=2))
+def check_consistency(scene: Scene, astray: FloatArray) -> Fault | None:
+    """Check that the joints are where feed and joint angles put them; `astray` is how far off, by pose."""
+    motion, pose = scene.motion, int(np.argmax(astray))
+    joints = joints_from_configuration(
+        motion.feed[pose], motion.joint_angles[pose], motion.link_length, motion.base_pose
+    )
+    amount, _, joint = worst_of(np.linalg.norm(motion.joints[pose] - joints, axis=1)[None])
     if amount <= PLACE_SLACK * scene.length:
         return None
     message = (

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache, partial
 
 import numpy as np
 import shapely
 
 from hrsnake_env.arm import FloatArray
+from planners.checks.gaps import Walls, complex_from_points, depths_from_gaps, moves_evenly
 from planners.checks.scene import (
-    CHUNK,
     MAX_SPLITS,
     PINCH_TOLERANCE,
     ROUNDING,
@@ -34,8 +36,11 @@ GROWTHS = (1e-6, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 7 / 8)
 PATIENCE = 6
 """How often a piece is halved before depths over an eighth of the tolerance are accepted."""
 
+GROUP = 1024
+"""How many links on their way from a pose to the next are looked at together."""
+
 MAX_PIECES = 40_000
-"""How many pieces of one chunk of poses are looked at together before the rest counts as not bounded."""
+"""How many pieces of one group there may be before the rest counts as not bounded."""
 
 FAULT_SAMPLES = 257
 """Times between two poses at which the depth is looked for when a fault there is described."""
@@ -60,23 +65,29 @@ class _Region:
         return np.asarray(covered)
 
 
-def _region(scene: Scene, growth: float) -> _Region:
-    """Build the region for a depth of at most `growth`, to be sure a little less than that.
+def _inset(scene: Scene, growth: float) -> float:
+    """Return by how much to shrink the free space for a depth of at most `growth`, to be sure a little less.
 
-    Buffers have chords in place of arcs, so growing falls short; shrinking does by the factor of `inflated`.
-    Shallow dents may be filled by a hundredth of the distance.
+    Buffers have chords in place of arcs: growing falls short, shrinking does not shrink enough. Shallow dents
+    may be filled by a hundredth of the distance.
     """
-    shrink = scene.radius - growth
-    if shrink <= 0.0:
-        grown = prepared(scene.free.buffer(-0.99 * shrink))
+    inset = scene.radius - growth
+    return 0.99 * inset if inset <= 0.0 else inset / math.cos(math.pi / (4 * ARC_SEGMENTS))
+
+
+def _region(scene: Scene, growth: float) -> _Region:
+    """Build the region for a depth of at most `growth`."""
+    inset = _inset(scene, growth)
+    if inset <= 0.0:
+        grown = prepared(scene.free.buffer(-inset))
         return _Region(depth=growth, everywhere=grown, in_front=grown)
-    inflated = shrink / math.cos(math.pi / (4 * ARC_SEGMENTS))
-    everywhere = scene.free.buffer(-inflated, quad_segs=ARC_SEGMENTS)
-    in_front = scene.open_behind.buffer(-inflated, quad_segs=ARC_SEGMENTS).intersection(scene.free)
+    everywhere = scene.free.buffer(-inset, quad_segs=ARC_SEGMENTS)
+    in_front = scene.open_behind.buffer(-inset, quad_segs=ARC_SEGMENTS).intersection(scene.free)
     # The distance that came of it is measured: that it is large enough is then beyond doubt.
+    wanted = scene.radius - growth
     kept = min(
-        shapely.distance(everywhere, scene.walls) if not everywhere.is_empty else shrink,
-        shapely.distance(in_front, scene.walls_in_front) if not in_front.is_empty else shrink,
+        shapely.distance(everywhere, scene.walls) if not everywhere.is_empty else wanted,
+        shapely.distance(in_front, scene.walls_in_front) if not in_front.is_empty else wanted,
     )
     return _Region(depth=scene.radius - kept, everywhere=prepared(everywhere), in_front=prepared(in_front))
 
@@ -115,12 +126,11 @@ class _Pieces:
             part=part.reshape(-1, 2),
         )
 
-    def placed(self, scene: Scene, time: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Compute the segments in the maze at a time of each piece, shape (n, 2, 2), and which emerge."""
+    def placed(self, scene: Scene, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Compute the segments in the maze at a time of each piece, shape (n, 2, 2), and the joints' arcs."""
         joints, arc = scene.ends(self.interval, self.link, time)
         joints = scene.in_maze(joints, arc)
-        segments = joints[:, :1] + self.part[..., None] * (joints[:, 1:] - joints[:, :1])
-        return segments, scene.emerging(arc[:, 0])
+        return joints[:, :1] + self.part[..., None] * (joints[:, 1:] - joints[:, :1]), arc
 
 
 def check_between(
@@ -131,42 +141,50 @@ def check_between(
     Only links that are `doubtful` after a pose are looked at, and of these not those that are deeper at one
     of the two poses: the fault of that pose says it already.
     """
-    motion, bound = scene.motion, 0.0
-    skipped = deep[1:] | deep[:-1]
+    bound, skipped = 0.0, deep[1:] | deep[:-1]
     moving = np.maximum(scene.arc[1:, 1:], scene.arc[:-1, 1:]) > ROUNDING * scene.length
     interval, link = np.nonzero(moving & doubtful[:-1] & ~skipped)
-    shares = GROWTHS if len(link) else ()
-    regions = [_region(scene, share * PINCH_TOLERANCE * scene.length) for share in shares]
-    open_: list[_Pieces] = []
-    for first in range(0, motion.n_poses - 1, CHUNK):
-        chosen = (interval >= first) & (interval < first + CHUNK)
-        span = np.tile((0.0, 1.0), (int(chosen.sum()), 1))
+    region_of = cache(partial(_region, scene))
+    walls, open_ = Walls.of(scene), []
+    for first in range(0, len(link), GROUP):
+        chosen = slice(first, first + GROUP)
+        span = np.tile((0.0, 1.0), (len(link[chosen]), 1))
         pieces = _Pieces(interval=interval[chosen], link=link[chosen], time=span, part=span)
-        chunk_bound, chunk_open = _swept(scene, pieces, regions)
-        bound = max(bound, chunk_bound)
-        open_ += [piece for piece in chunk_open if len(piece)]
-        tell("validate", 0.6 + 0.2 * min(1.0, (first + CHUNK) / motion.n_poses))
+        group_bound, group_open = _swept(scene, pieces, walls, region_of)
+        bound = max(bound, group_bound)
+        open_ += [piece for piece in group_open if len(piece)]
+        tell("validate", 0.6 + 0.2 * min(1.0, (first + GROUP) / len(link)))
     if open_:
         return math.inf, _sweep_fault(scene, open_)
     return math.inf if skipped.any() else bound, None
 
 
-def _swept(scene: Scene, pieces: _Pieces, regions: list[_Region]) -> tuple[float, list[_Pieces]]:
+def _swept(
+    scene: Scene, pieces: _Pieces, walls: Walls, region_of: Callable[[float], _Region]
+) -> tuple[float, list[_Pieces]]:
     """Bound the depth of pieces by halving; return the bound, and the pieces that are deep or still open."""
     tolerance, bound, deep = PINCH_TOLERANCE * scene.length, 0.0, []
+    deepest = scene.radius - _inset(scene, GROWTHS[-1] * tolerance)  # by hulls, so by gaps too
     for level in range(MAX_SPLITS + 1):
         if not len(pieces):
             break
         limit = tolerance if level >= PATIENCE else tolerance / 8.0
         curve = scene.curvature[pieces.interval, pieces.link + 1] * np.ptp(pieces.time, axis=1) ** 2
         (before, early), (after, late) = (pieces.placed(scene, pieces.time[:, k]) for k in (0, 1))
-        depth = _hull_depth(np.concatenate([before, after], axis=1), early | late, curve, regions, limit)
+        emerging = scene.emerging(np.minimum(early[:, 0], late[:, 0]))
+        even = moves_evenly(early, late)
+        off = ~even & (scene.swerve[pieces.interval, pieces.link] > scene.slack)
+        by_gap = np.where(off, np.inf, curve)
+        depth = _gap_depth(scene, walls, (before, after), even, emerging, by_gap, min(limit, deepest))
+        rest = np.flatnonzero(np.isinf(depth))
+        corners = np.concatenate([before, after], axis=1)[rest]
+        depth[rest] = _hull_depth(scene, corners, emerging[rest], curve[rest], region_of, limit)
         bound = max(bound, float(np.max(depth, where=np.isfinite(depth), initial=0.0)))
         left = np.isinf(depth)
         twist = np.linalg.norm((after[:, 1] - before[:, 1]) - (after[:, 0] - before[:, 0]), axis=1) / 4.0
-        in_time, pieces = (curve >= twist)[left], pieces[left]
-        middle, emerging = pieces.placed(scene, pieces.time.mean(axis=1))
-        is_deep = are_deep(scene, middle, emerging)
+        in_time, pieces = (curve >= np.minimum(twist, tolerance / 32.0))[left], pieces[left]
+        middle, arc = pieces.placed(scene, pieces.time.mean(axis=1))
+        is_deep = are_deep(scene, middle, scene.emerging(arc[:, 0]))
         deep.append(pieces[is_deep])
         if level == MAX_SPLITS or 2 * len(pieces) > MAX_PIECES:
             break
@@ -177,13 +195,41 @@ def _swept(scene: Scene, pieces: _Pieces, regions: list[_Region]) -> tuple[float
     return bound, [*deep, pieces]
 
 
+def _gap_depth(
+    scene: Scene,
+    walls: Walls,
+    segments: tuple[FloatArray, FloatArray],
+    together: BoolArray,
+    emerging: BoolArray,
+    curve: FloatArray,
+    limit: float,
+) -> FloatArray:
+    """Bound the depth by gaps of segments, shape (n, 2, 2), before and after; infinite beyond `limit`."""
+    before, after = (complex_from_points(segment) for segment in segments)
+    ends = np.concatenate([before, after], axis=1)
+    middle = ends.mean(axis=1)
+    reach = np.abs(ends - middle[:, None]).max(axis=1) + scene.radius + curve + scene.slack
+    case, wall = walls.in_sight(middle, reach)
+    gap = walls.gaps((before[:, 0], before[:, 1]), (after[:, 0], after[:, 1]), together, case, wall)
+    return depths_from_gaps(scene, gap, before[:, 0], emerging, curve, limit)
+
+
 def _hull_depth(
-    corners: FloatArray, emerging: BoolArray, curve: FloatArray, regions: list[_Region], limit: float
+    scene: Scene,
+    corners: FloatArray,
+    emerging: BoolArray,
+    curve: FloatArray,
+    region_of: Callable[[float], _Region],
+    limit: float,
 ) -> FloatArray:
     """Bound the depth of hulls of `corners`, shape (n, 4, 2), grown by `curve`; infinite beyond `limit`."""
     depth = np.full(len(corners), np.inf)
-    for region in regions:
-        rest = np.flatnonzero(np.isinf(depth) & (region.depth + curve <= limit))
+    for growth in np.array(GROWTHS) * PINCH_TOLERANCE * scene.length:
+        rest = np.flatnonzero(np.isinf(depth) & (growth + curve <= limit))
+        if not len(rest):
+            continue
+        region = region_of(float(growth))
+        rest = rest[region.depth + curve[rest] <= limit]
         hulls = shapely.convex_hull(shapely.linestrings(corners[rest]))
         free = rest[region.covers(hulls, emerging[rest])]
         depth[free] = region.depth + curve[free]
@@ -194,7 +240,8 @@ def _sweep_fault(scene: Scene, open_: list[_Pieces]) -> Fault:
     """Name the worst of the pieces that are not bounded, by the depth at the middle of each."""
     worst: tuple[float, int, int] | None = None
     for pieces in open_:
-        clearance, index, _ = nearest(scene, *pieces.placed(scene, pieces.time.mean(axis=1)))
+        middle, arc = pieces.placed(scene, pieces.time.mean(axis=1))
+        clearance, index, _ = nearest(scene, middle, scene.emerging(arc[:, 0]))
         if worst is None or clearance < worst[0]:
             worst = (clearance, int(pieces.interval[index]), int(pieces.link[index]))
     assert worst is not None  # the caller has pieces
@@ -206,8 +253,8 @@ def _sweep_fault(scene: Scene, open_: list[_Pieces]) -> Fault:
         time=np.stack([times, times], axis=1),
         part=np.tile((0.0, 1.0), (FAULT_SAMPLES, 1)),
     )
-    segments, emerging = samples.placed(scene, times)
-    clearance, _, place = nearest(scene, segments, emerging)
+    segments, arc = samples.placed(scene, times)
+    clearance, _, place = nearest(scene, segments, scene.emerging(arc[:, 0]))
     amount, what = -clearance, f"gets {scene.figure(-clearance)} deep in a wall"
     if amount <= PINCH_TOLERANCE * scene.length:
         amount, what = (

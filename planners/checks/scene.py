@@ -52,6 +52,13 @@ class Scene:
         return self.motion.link_length
 
     @cached_property
+    def slack(self) -> float:
+        """What counts as rounding where places in the maze are compared, in maze units."""
+        return ROUNDING * self.length + 100.0 * float(
+            np.finfo(np.float64).eps * np.abs(self.maze.walls).max()
+        )
+
+    @cached_property
     def free(self) -> Geometry:
         """The free space."""
         return prepared(self.maze.free_space)
@@ -113,6 +120,27 @@ class Scene:
         turns = np.diff(headings, axis=0, append=headings[-1:])
         sums = np.cumsum(turns**2, axis=1) * self.length / 8.0
         return np.concatenate([np.zeros((len(turns), 1)), sums], axis=1)
+
+    @cached_property
+    def swerve(self) -> FloatArray:
+        """How far off the base a link comes out of the feeder after each pose, shape (n_poses, n_links).
+
+        On the axis a joint comes out at the base; where it does not (a fault), it may leave the line from the
+        base to its next place by as much as the point at which its chord passes the base is off the base.
+        """
+        motion, before = self.motion, self.arc
+        after = np.concatenate([before[1:], before[-1:]])
+        pose, joint = np.nonzero((before < 0.0) != (after < 0.0))
+        share = before[pose, joint] / (before[pose, joint] - after[pose, joint])
+        rows, row = np.unique(pose, return_inverse=True)
+        feed, angles = (
+            np.stack([values[rows], values[rows + 1]]) for values in (motion.feed, motion.joint_angles)
+        )
+        ends = joints_from_configuration(feed, angles, self.length, motion.base_pose)[:, row, joint]
+        passing = ends[0] + share[:, None] * (ends[1] - ends[0])
+        off = np.zeros_like(before)
+        off[pose, joint] = np.linalg.norm(passing - motion.base_pose[:2], axis=1)
+        return np.maximum(off[:, :-1], off[:, 1:])
 
     def figure(self, amount: float) -> str:
         """Write a length in maze units and in link lengths."""

@@ -73,7 +73,8 @@ def nearest(scene: Scene, segments: FloatArray, emerging: BoolArray) -> Nearest:
 def are_deep(scene: Scene, segments: FloatArray, emerging: BoolArray) -> BoolArray:
     """Say which capsules are surely deeper in a wall than the pinch tolerance."""
     lines, excess = shapely.linestrings(segments), scene.radius - PINCH_TOLERANCE * scene.length
-    deep = ~shapely.covers(scene.shallow, lines)
+    deep = ~shapely.covers(scene.free, lines)
+    deep[deep] = ~shapely.covers(scene.shallow, lines[deep]) if deep.any() else False
     if excess > 0.0:
         deep |= scene.distances(lines, emerging) < excess
     return np.asarray(deep)
