@@ -47,9 +47,6 @@ FRACTIONS = (0.5, 0.3, 0.7)
 PART = 1.0 / 16.0
 """Smallest triangles of a question in parts of the interval: a limit that close is not worth deciding."""
 
-Places = tuple[IntArray, FloatArray]
-"""Nodes and headings along a way, base first."""
-
 
 class Passage(StrEnum):
     """Say whether a rod passes."""
@@ -281,20 +278,17 @@ class _Questions:
         space, every = _copy(self._first), True
         while True:
             update_headings(space, length, every)
-            nodes, headings = self._way(space, task)
+            nodes, headings, doubts = self._way(space, task)
             if nodes.size == 0:
                 passes = Passage.NO
                 break
-            doubtful = (nodes >= FIRST) & ((nodes - FIRST) % PER_TRIANGLE < GAPS)
-            if not doubtful.any():
+            if not ((nodes >= FIRST) & ((nodes - FIRST) % PER_TRIANGLE < GAPS)).any():
                 passes = Passage.YES
                 break
-            triangles = np.unique((nodes[doubtful] - FIRST) // PER_TRIANGLE)
-            triangles = triangles[space.sizes[triangles] > resolution]
-            if not triangles.size or time.perf_counter() > deadline:
+            if not doubts.size or time.perf_counter() > deadline:
                 passes = Passage.UNDECIDED
                 break
-            space, every = _halved(space, triangles), False
+            space, every = _halved(space, doubts), False
         return RodVerdict(
             passes=passes,
             length=length,
@@ -302,14 +296,15 @@ class _Questions:
             n_triangles=int(space.counts[1]),
         )
 
-    def _way(self, space: RodSpace, task: Task) -> Places:
-        """Return the cheapest way, base first; empty if there is none."""
+    def _way(self, space: RodSpace, task: Task) -> tuple[IntArray, FloatArray, IntArray]:
+        """Return nodes and headings of the cheapest way, base first, and the triangles to be halved."""
         n_nodes = FIRST + int(space.counts[1]) * PER_TRIANGLE
         if self._work[0].cost.size < n_nodes:
             self._work = _work_space(2 * n_nodes)
         frontier, nodes, headings = self._work
         n = search(space, task, frontier, nodes, headings)
-        return nodes[:n][::-1].copy(), headings[:n][::-1].copy()
+        doubts = np.unique(frontier.doubts[: frontier.used[2]])
+        return nodes[:n][::-1].copy(), headings[:n][::-1].copy(), doubts
 
 
 # From the maze to triangles
@@ -433,8 +428,9 @@ def _work_space(n_nodes: int) -> tuple[Frontier, IntArray, FloatArray]:
         parent=np.zeros(n_nodes, dtype=np.int64),
         heap=np.zeros(n_nodes, dtype=np.int64),
         place=np.zeros(n_nodes, dtype=np.int64),
-        used=np.zeros(2, dtype=np.int64),
+        used=np.zeros(3, dtype=np.int64),
         touched=np.zeros(n_nodes, dtype=np.int64),
+        doubts=np.zeros(n_nodes, dtype=np.int64),
     )
     return frontier, np.zeros(n_nodes, dtype=np.int64), np.zeros(n_nodes)
 

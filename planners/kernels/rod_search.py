@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from planners.kernels.rod_space import GAPS, SLACK, RodSpace, _beside
+from planners.kernels.rod_space import GAPS, SLACK, RodSpace, beside
 from planners.kernels.types import FloatArray, IntArray
 
 PER_TRIANGLE = 2 * GAPS
@@ -52,10 +52,12 @@ class Frontier(NamedTuple):
         Open nodes, a binary heap by cost.
     place : array of int
         Of the node in the heap.
-    used : array of int, shape (2,)
-        Number of open nodes and of touched nodes.
+    used : array of int, shape (3,)
+        Number of open nodes, of touched nodes, and of doubts.
     touched : array of int
         Nodes with a cost.
+    doubts : array of int
+        Triangles on the way to be halved.
     """
 
     cost: FloatArray
@@ -65,6 +67,7 @@ class Frontier(NamedTuple):
     place: IntArray
     used: IntArray
     touched: IntArray
+    doubts: IntArray
 
 
 class Task(NamedTuple):
@@ -217,49 +220,47 @@ def _contains(space: RodSpace, triangle: int, x: float, y: float, margin: float)
 
 
 @njit(cache=True)
-def _exact_goal(task: Task, x: float, y: float, start: float, end: float, heading: float) -> float:
-    """Return the nearest heading in an interval with which a rod reaches the goal; inf if there is none."""
+def _goal_window(task: Task, x: float, y: float, slack: float) -> tuple[float, float]:
+    """Return the headings with which a rod from (x, y) has its tip in the goal's disc, grown by a slack.
+
+    The interval is empty (start > end) where the rod is too short or too long.
+    """
     dx, dy = task.goal_x - x, task.goal_y - y
-    away = np.sqrt(dx * dx + dy * dy)
-    radius = task.goal_radius * (1.0 - SLACK)
+    away, radius = np.sqrt(dx * dx + dy * dy), task.goal_radius + slack
     if abs(away - task.length) > radius:
-        return np.inf
+        return np.inf, -np.inf
     half = np.pi
-    if away > 0.0:
-        cosine = (away * away + task.length**2 - radius**2) / (2.0 * away * task.length)
+    if away > 0.0:  # the law of cosines
+        cosine = (away * away + task.length**2 - radius * radius) / (2.0 * away * task.length)
         half = np.arccos(max(-1.0, min(1.0, cosine)))
     middle = np.arctan2(dy, dx)
-    window = np.array([middle - half, middle + half])
-    low, high = _beside(start, end, window)
-    low, high = max(low, start), min(high, end)
-    return max(low, min(high, heading)) if low <= high else np.inf
+    return middle - half, middle + half
+
+
+@njit(cache=True)
+def _exact_goal(task: Task, x: float, y: float, start: float, end: float, heading: float) -> float:
+    """Return the nearest heading in an interval with which a rod reaches the goal; inf if there is none."""
+    first, last = _goal_window(task, x, y, -SLACK * task.goal_radius)
+    if first > last:
+        return np.inf
+    first, last = beside(start, end, first, last)
+    first, last = max(first, start), min(last, end)
+    return max(first, min(last, heading)) if first <= last else np.inf
 
 
 @njit(cache=True)
 def _may_be_goal(space: RodSpace, task: Task, triangle: int, gap: FloatArray) -> bool:
     """Tell whether a rod with its tail in a triangle and a heading in a gap may have its tip at the goal.
 
-    Tip minus tail lies in the goal's disc seen from the triangle: the hull of three discs.
+    No tail is further from the centre than two thirds of the longest edge, and its tip is as far from that
+    of the rod at the centre.
     """
-    radius = task.goal_radius * (1.0 + SLACK)
-    cx, cy = task.goal_x - space.centres[triangle, 0], task.goal_y - space.centres[triangle, 1]
-    middle = np.arctan2(cy, cx)
-    away = np.sqrt(cx * cx + cy * cy)
-    slack = radius + space.sizes[triangle]
-    if abs(away - task.length) > slack:
+    slack = 0.667 * space.sizes[triangle] + SLACK * task.length
+    first, last = _goal_window(task, space.centres[triangle, 0], space.centres[triangle, 1], slack)
+    if first > last:
         return False
-    if away <= slack:
-        return True
-    low, high = 0.0, 0.0
-    for k in range(3):
-        corner = space.vertices[space.triangles[triangle, k]]
-        x, y = task.goal_x - corner[0], task.goal_y - corner[1]
-        half = np.arcsin(radius / np.sqrt(x * x + y * y))
-        turn = np.arctan2(cx * y - cy * x, cx * x + cy * y)
-        low, high = min(low, turn - half), max(high, turn + half)
-    start, end = middle + low - SLACK, middle + high + SLACK
-    first, last = _beside(start, end, gap)
-    return bool(first <= end and start <= last)
+    start, end = beside(first, last, gap[0], gap[1])
+    return bool(start <= last + SLACK and first - SLACK <= end)
 
 
 # Steps
@@ -282,7 +283,7 @@ def _step_exact(
     heading = f.heading[node]
     away = np.sqrt((px - x) ** 2 + (py - y) ** 2)
     for h in range(space.n_exact[triangle]):
-        low, high = _beside(start, end, space.exact[triangle, h])
+        low, high = beside(start, end, space.exact[triangle, h, 0], space.exact[triangle, h, 1])
         low, high = max(low, start), min(high, end)
         if high <= low:
             continue
@@ -308,7 +309,7 @@ def _leave_exact(f: Frontier, space: RodSpace, task: Task, node: int) -> None:
     x, y = space.centres[triangle, 0], space.centres[triangle, 1]
     # The interval beside the rod's own heading, so that headings never jump.
     heading = f.heading[node]
-    start, end = _beside(heading, heading, space.exact[triangle, g])
+    start, end = beside(heading, heading, space.exact[triangle, g, 0], space.exact[triangle, g, 1])
     for k in range(3):
         if space.neighbours[triangle, k] >= 0:
             _step_exact(f, space, task, node, x, y, start, end, space.neighbours[triangle, k])
@@ -335,7 +336,7 @@ def _leave_possible(f: Frontier, space: RodSpace, task: Task, node: int) -> None
             continue
         away = _doubt(task, space.sizes[across])
         for h in range(space.n_possible[across]):
-            low, high = _beside(gap[0], gap[1], space.possible[across, h])
+            low, high = beside(gap[0], gap[1], space.possible[across, h, 0], space.possible[across, h, 1])
             if low <= gap[1] and gap[0] <= high:
                 _offer(f, FIRST + across * PER_TRIANGLE + h, f.cost[node] + away, 0.0, node)
     if _may_be_goal(space, task, triangle, gap):
@@ -349,13 +350,30 @@ def _leave_base(f: Frontier, space: RodSpace, task: Task) -> None:
             continue
         _step_exact(f, space, task, BASE, task.x, task.y, task.gap_start, task.gap_end, triangle)
         for h in range(space.n_possible[triangle]):
-            low, high = _beside(task.heading, task.heading, space.possible[triangle, h])
+            low, high = beside(
+                task.heading, task.heading, space.possible[triangle, h, 0], space.possible[triangle, h, 1]
+            )
             if low - SLACK <= task.heading <= high + SLACK:
                 node = FIRST + triangle * PER_TRIANGLE + h
                 _offer(f, node, _doubt(task, space.sizes[triangle]), 0.0, BASE)
     at_goal = _exact_goal(task, task.x, task.y, task.gap_start, task.gap_end, task.heading)
     if not np.isinf(at_goal):
         _offer(f, GOAL, 0.5 * task.length * abs(at_goal - task.heading), at_goal, BASE)
+
+
+@njit(cache=True)
+def _note_way(f: Frontier, space: RodSpace, way: IntArray, headings: FloatArray, resolution: float) -> int:
+    """Write down the way to the goal, goal first, and which of its triangles are to be halved."""
+    n, node = 0, GOAL
+    while node >= 0:
+        way[n], headings[n] = node, f.heading[node]
+        triangle = (node - FIRST) // PER_TRIANGLE
+        if node >= FIRST and (node - FIRST) % PER_TRIANGLE < GAPS and space.sizes[triangle] > resolution:
+            f.doubts[f.used[2]] = triangle
+            f.used[2] += 1
+        node = f.parent[node]
+        n += 1
+    return n
 
 
 @njit(cache=True)
@@ -369,7 +387,7 @@ def search(space: RodSpace, task: Task, f: Frontier, way: IntArray, headings: Fl
     task : Task
         What the rod shall do.
     f : Frontier
-        Work space for FIRST + n_triangles * PER_TRIANGLE nodes, with all costs infinite; left so.
+        Work space with all costs infinite; left so. `doubts` are filled with the triangles to be halved.
     way : array of int, shape (n_nodes,)
         Filled with the nodes of the way, goal first.
     headings : array, shape (n_nodes,)
@@ -379,17 +397,18 @@ def search(space: RodSpace, task: Task, f: Frontier, way: IntArray, headings: Fl
     -------
     n : int
         Number of nodes on the way; 0 if the goal cannot be reached.
+
+    Notes
+    -----
+    The caller guarantees FIRST + n_triangles * PER_TRIANGLE nodes of work space.
     """
-    f.used[0] = f.used[1] = 0
+    f.used[:] = 0
     _offer(f, BASE, 0.0, task.heading, -1)
     n = 0
     while f.used[0] > 0:
         node = _pop(f)
         if node == GOAL:
-            while node >= 0:
-                way[n], headings[n] = node, f.heading[node]
-                node = f.parent[node]
-                n += 1
+            n = _note_way(f, space, way, headings, task.resolution)
             break
         if node == BASE:
             _leave_base(f, space, task)

@@ -365,10 +365,13 @@ def possible_gaps(
 
 
 @njit(cache=True)
-def _beside(start: float, end: float, gap: FloatArray) -> tuple[float, float]:
-    """Return a gap moved by whole turns so that its middle is nearest to that of (start, end)."""
-    turns = TWO_PI * np.round((start + end - gap[0] - gap[1]) / (2.0 * TWO_PI))
-    return gap[0] + turns, gap[1] + turns
+def beside(start: float, end: float, first: float, last: float) -> tuple[float, float]:
+    """Return an interval (first, last) moved by whole turns so that its middle is nearest to another's.
+
+    If the two meet after any whole turns, they meet after these.
+    """
+    turns = TWO_PI * np.round((start + end - first - last) / (2.0 * TWO_PI))
+    return first + turns, last + turns
 
 
 @njit(cache=True)
@@ -403,7 +406,7 @@ def update_headings(space: RodSpace, length: float, every: bool) -> None:
         space.n_exact[t] = 0
         for k in range(n_gaps):
             for h in range(space.n_possible[t]):
-                start, end = _beside(gaps[k, 0], gaps[k, 1], space.possible[t, h])
+                start, end = beside(gaps[k, 0], gaps[k, 1], space.possible[t, h, 0], space.possible[t, h, 1])
                 if start <= gaps[k, 0] and gaps[k, 1] <= end and space.n_exact[t] < GAPS:
                     space.exact[t, space.n_exact[t]] = gaps[k]
                     space.around[t, space.n_exact[t]] = h
