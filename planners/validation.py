@@ -2,21 +2,23 @@
 
 At the poses the exact polygons decide: a link may touch a wall, and no more. Between poses a bound decides,
 not samples. Feed and joint angles change linearly there, so link headings do, and joint k stays within
-``e_k = L / 8 * sum_{j < k} (change of heading j)^2`` of the place that moves evenly along the straight line
-between its two places (a curve leaves its chord by at most an eighth of its largest second derivative). A link
-therefore stays within e of its tip-side joint of a segment with both ends on chords.
+``e_k = L / 8 * sum_{j < k} (change of heading j)^2`` of a point that moves evenly along the straight line
+between its two places (a curve leaves its chord by at most an eighth of its largest second derivative). So a
+link stays within e of its tip-side joint of a segment whose ends move straight and evenly.
 
-Three things are tried, from the cheap to the exact; each is a proof, and what one leaves goes on to the next:
+Three things are tried, from the cheap to the exact. Each is a proof; what one leaves open goes to the next:
 
 1. Reach (`checks.sieve`). A link that over many poses gets no farther from its place than the walls, or
    another link, are away from it there is free of them at all these poses and between.
-2. Gaps (`checks.gaps`). At any moment the line of a wall, or that of the moving segment, parts the two by a
-   gap g. Then the link is at most e - g deep (plus its radius), if a point of it is in the free space.
+2. Gaps (`checks.gaps`). Where at any moment the line of each wall, or that of the moving segment, parts the
+   two by g, and a point of the segment is in the free space, the link is at most e - g deep, plus its radius.
 3. Polygons. At the poses `covers` and `distance` decide. Between poses a link stays inside the convex hull of
-   its two placements, grown by e: where that hull is covered by the free space grown by g, the link is nowhere
-   deeper than g + e. Where neither gap nor hull is enough, the piece is halved, in time if e is what makes it
-   too coarse, along the link if the turning of the link does (the hull of a link that pivots is wide away from
-   the pivot), and both halves are tried, to a limit.
+   its two placements, grown by e: where that hull is covered by the free space grown by g, the link is
+   nowhere deeper than g + e.
+
+Where neither gap nor hull is enough, the piece is halved, in time if e is what makes it too coarse, along the
+link if the turning of the link does (the hull of a link that pivots is wide away from the pivot), and both
+halves are tried, to a limit.
 
 Two rules say what of the arm is in the maze:
 

@@ -574,6 +574,32 @@ def test_no_configuration_between_poses_is_deeper_than_the_bound(radius, spread)
     assert cut > (3 if spread == 0.3 else -1)
 
 
+@pytest.mark.parametrize("radius", [0.0, 4.0])
+def test_no_link_that_comes_askew_out_of_the_feeder_is_deeper_than_the_bound(radius):
+    rng = np.random.default_rng(5)
+    share, bounded, cut = np.linspace(0.0, 1.0, 101), 0, 0
+    for _ in range(150):
+        angles = rng.uniform(-1.0, 1.0, (1, 4)) * [[1.0, 1.0, 0.5, 0.5]] + rng.uniform(-0.02, 0.02, (2, 4))
+        feed = rng.choice([80.0, 160.0, 240.0]) + np.array([-1.0, 1.0]) * rng.uniform(0.1, 30.0, 2)
+        motion = Motion.from_configurations(feed, angles, 80.0, PILLARS.base_pose)
+        report = validate(motion, PILLARS, ArmSpec(link_length=80.0, link_radius=radius))
+        if {"penetration", "sweep"} & kinds(report):
+            cut += 1
+            continue
+        bounded += 1
+        moved = Motion.from_configurations(
+            feed[0] + share * (feed[1] - feed[0]),
+            angles[0] + share[:, None] * (angles[1] - angles[0]),
+            80.0,
+            PILLARS.base_pose,
+        )
+        arc = moved.feed[:, None] - 80.0 * (4 - np.arange(5))
+        joints = np.where(arc[..., None] < 0.0, 0.0, moved.joints)
+        assert deepest(joints, radius) <= report.penetration_between + 1e-9
+    assert bounded > 5
+    assert cut > 5
+
+
 def test_an_arm_without_a_crossing_fault_is_simple_between_poses():
     rng = np.random.default_rng(11)
     maze = hall()

@@ -169,20 +169,21 @@ def _swept(
         if not len(pieces):
             break
         limit = tolerance if level >= PATIENCE else tolerance / 8.0
-        curve = scene.curvature[pieces.interval, pieces.link + 1] * np.ptp(pieces.time, axis=1) ** 2
+        span = np.ptp(pieces.time, axis=1)
         (before, early), (after, late) = (pieces.placed(scene, pieces.time[:, k]) for k in (0, 1))
         emerging = scene.emerging(np.minimum(early[:, 0], late[:, 0]))
         even = moves_evenly(early, late)
-        off = ~even & (scene.swerve[pieces.interval, pieces.link] > scene.slack)
-        by_gap = np.where(off, np.inf, curve)
-        depth = _gap_depth(scene, walls, (before, after), even, emerging, by_gap, min(limit, deepest))
+        swerve = np.where(even, 0.0, scene.swerve[pieces.interval, pieces.link] * span)
+        curve = scene.curvature[pieces.interval, pieces.link + 1] * span**2 + swerve
+        depth = _gap_depth(scene, walls, (before, after), even, emerging, curve, min(limit, deepest))
         rest = np.flatnonzero(np.isinf(depth))
         corners = np.concatenate([before, after], axis=1)[rest]
         depth[rest] = _hull_depth(scene, corners, emerging[rest], curve[rest], region_of, limit)
         bound = max(bound, float(np.max(depth, where=np.isfinite(depth), initial=0.0)))
         left = np.isinf(depth)
         twist = np.linalg.norm((after[:, 1] - before[:, 1]) - (after[:, 0] - before[:, 0]), axis=1) / 4.0
-        in_time, pieces = (curve >= np.minimum(twist, tolerance / 32.0))[left], pieces[left]
+        in_time = (curve >= np.minimum(twist, tolerance / 32.0)) | (swerve > 0.0)
+        in_time, pieces = in_time[left], pieces[left]
         middle, arc = pieces.placed(scene, pieces.time.mean(axis=1))
         is_deep = are_deep(scene, middle, scene.emerging(arc[:, 0]))
         deep.append(pieces[is_deep])

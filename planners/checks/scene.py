@@ -123,24 +123,24 @@ class Scene:
 
     @cached_property
     def swerve(self) -> FloatArray:
-        """How far off the base a link comes out of the feeder after each pose, shape (n_poses, n_links).
+        """How far the ends of a link may be off their lines after each pose, shape (n_poses, n_links).
 
-        On the axis a joint comes out at the base; where it does not (a fault), it may leave the line from the
-        base to its next place by as much as the point at which its chord passes the base is off the base.
+        A joint that comes out of the feeder at the base is on the line from there to its next place. If it
+        comes out elsewhere (a fault) it is somewhere on its way, which is at most 4 e longer than its chord.
         """
         motion, before = self.motion, self.arc
         after = np.concatenate([before[1:], before[-1:]])
         pose, joint = np.nonzero((before < 0.0) != (after < 0.0))
         share = before[pose, joint] / (before[pose, joint] - after[pose, joint])
         rows, row = np.unique(pose, return_inverse=True)
-        feed, angles = (
-            np.stack([values[rows], values[rows + 1]]) for values in (motion.feed, motion.joint_angles)
-        )
+        feed, angles = (np.stack([all_[rows], all_[rows + 1]]) for all_ in (motion.feed, motion.joint_angles))
         ends = joints_from_configuration(feed, angles, self.length, motion.base_pose)[:, row, joint]
         passing = ends[0] + share[:, None] * (ends[1] - ends[0])
-        off = np.zeros_like(before)
-        off[pose, joint] = np.linalg.norm(passing - motion.base_pose[:2], axis=1)
-        return np.maximum(off[:, :-1], off[:, 1:])
+        off = np.linalg.norm(passing - motion.base_pose[:2], axis=1) > self.slack
+        way = np.linalg.norm(ends[1] - ends[0], axis=1) + 4.0 * self.curvature[pose, joint]
+        ways = np.zeros_like(before)
+        ways[pose, joint] = np.where(off, way, 0.0)
+        return np.maximum(ways[:, :-1], ways[:, 1:])
 
     def figure(self, amount: float) -> str:
         """Write a length in maze units and in link lengths."""
