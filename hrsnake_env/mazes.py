@@ -177,7 +177,7 @@ def random_corridor(seed: int) -> Maze:
         width = rng.uniform(120.0, 220.0)
         turns = np.radians(rng.uniform(35.0, 125.0, 7)) * rng.choice([-1.0, 1.0], 7)
         headings = np.pi / 2 + np.concatenate([[0.0], np.cumsum(turns)])
-        legs = np.concatenate([[7.0], rng.uniform(1.5, 5.0, 6), [5.0]]) * width
+        legs = np.concatenate([[7.0], rng.uniform(2.0, 6.0, 6), [5.0]]) * width
         steps = legs[:, None] * np.column_stack([np.cos(headings), np.sin(headings)])
         waypoints = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
         if _keeps_apart(waypoints, width):

@@ -20,8 +20,11 @@ __all__ = ["Potential", "laplace_potential", "passage_width"]
 CELLS_PER_WIDTH = 12.0
 """Grid cells across the narrowest passage."""
 
+MANY_CELLS, FEWEST_CELLS_PER_WIDTH = 100_000, 6.0
+"""In a wide hall with a narrow passage cells are larger, until these are all, but not larger than this."""
+
 MAX_CELLS = 400_000
-"""Largest number of grid cells in the bounding box; above it, cells are larger."""
+"""Largest number of grid cells in the bounding box; above it, cells are larger in any case."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -104,7 +107,8 @@ def laplace_potential(maze: Maze, *, width: float | None = None) -> Potential:
     maze : Maze
         The maze.
     width : float, optional
-        The passage width, in maze units; the grid spacing is a twelfth of it. By default it is computed.
+        The passage width, in maze units; the grid spacing is a twelfth of it, or more where that would be
+        very many cells. By default it is computed.
 
     Returns
     -------
@@ -112,8 +116,10 @@ def laplace_potential(maze: Maze, *, width: float | None = None) -> Potential:
         With a node on the goal.
     """
     x_min, y_min, x_max, y_max = maze.free_space.bounds
-    coarsest = math.sqrt((x_max - x_min) * (y_max - y_min) / MAX_CELLS)
-    cell = max((passage_width(maze) if width is None else width) / CELLS_PER_WIDTH, coarsest)
+    width = passage_width(maze) if width is None else width
+    side = math.sqrt((x_max - x_min) * (y_max - y_min))
+    coarse = min(side / math.sqrt(MANY_CELLS), width / FEWEST_CELLS_PER_WIDTH)
+    cell = max(width / CELLS_PER_WIDTH, coarse, side / math.sqrt(MAX_CELLS))
     # Two rings of nodes outside, so that differences can be taken everywhere inside.
     left = math.ceil((maze.goal[0] - x_min) / cell) + 2
     below = math.ceil((maze.goal[1] - y_min) / cell) + 2

@@ -57,7 +57,7 @@ class Fineness(NamedTuple):
 
 
 FINENESSES = (
-    Fineness(48, 0.9, 0.045, 8e-4, 12),
+    Fineness(44, 0.9, 0.045, 8e-4, 12),
     Fineness(96, 0.9, 0.045, 8e-4, 12),
     Fineness(160, 0.9, 0.045, 8e-4, 100),
     Fineness(320, 0.9, 0.045, 8e-4, 100),
@@ -121,19 +121,20 @@ LONGEST_STEPS, LONGEST_RATIO = 220, 0.995
 MAX_ATTEMPTS = 150
 """Tracks that are tried at one fineness."""
 
-MAX_VERTICES = 600_000
-"""Vertices that all tracks of one fineness may have together: a few seconds of work."""
+MAX_VERTICES = 200_000
+"""Vertices that all tracks of one fineness may add to the earlier ones: about a second of work."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Track:
     """Hold a joint track, as `planners.kernels.sweep.grow_track` fills it.
 
-    The arrays have room for more than its n vertices.
+    The arrays have room for more than its n vertices, of which the first are those of an earlier track.
     """
 
     fineness: Fineness
     n: int
+    resumed: int
     ending: int
     aim: FloatArray
     points: FloatArray
@@ -328,7 +329,7 @@ class _Search:
             float(self.query.arm.link_length),
         )
         track = grow(self.geometry, self.query.arm, fineness, aim, earlier)
-        self.left, self.work = self.left - 1, self.work - track.n
+        self.left, self.work = self.left - 1, self.work - (track.n - track.resumed)
         if self.best is None or track.index > self.best.index:
             self.best = track
         self.seconds["plan"] += time.perf_counter() - clock
@@ -371,6 +372,7 @@ def grow(
     track = Track(
         fineness=fineness,
         n=0,
+        resumed=0,
         ending=kernel.FULL,
         aim=aim,
         points=np.empty((n_max, 2)),
@@ -409,7 +411,7 @@ def grow(
         track.gaps,
         np.empty(len(track.gaps), dtype=np.bool_),
     )
-    return dataclasses.replace(track, n=n, ending=ending)
+    return dataclasses.replace(track, n=n, resumed=resumed, ending=ending)
 
 
 def _common(track: Track, earlier: Track, s: FloatArray, length: float) -> int:

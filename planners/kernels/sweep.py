@@ -361,6 +361,7 @@ def grow_track(
     most = walls.shape[0] + 1
     blocked, found = np.empty((most, 2)), np.empty((most, 2))
     reached, reached_next = np.zeros(most, dtype=np.bool_), np.zeros(most, dtype=np.bool_)
+    before = np.empty_like(viable)
     turns = np.array([0.0, 1.0, -1.0, 0.5, -0.5, 0.25, -0.25])
     if resumed == 0:
         n = straight + 1
@@ -415,6 +416,8 @@ def grow_track(
         if in_place:
             least, most_turn = -turn, turn
         new = heading
+        for r in range(first[s], first[n]):
+            before[r] = viable[r]
         for k in range(turns.shape[0]):  # first the step as it is chosen, then with other turns
             aimed = change if k == 0 else turns[k] * turn
             aimed = heading + min(max(aimed, least), most_turn)
@@ -447,10 +450,8 @@ def grow_track(
             if held >= 0 and off <= 1e-9:
                 accepted = True
                 break
-            # What the rejected vertex has pruned is viable again, as far as the vertices before it say.
-            for r in range(first[s], first[n]):
-                viable[r] = True
-            _prune(s, n - 1, first, gaps, viable, slack, True)
+            for r in range(first[s], first[n]):  # what the rejected vertex has pruned is viable again
+                viable[r] = before[r]
         if not accepted:
             return n, DEAD_END
         waited = waited + 1 if in_place else 0
