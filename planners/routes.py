@@ -1,74 +1,56 @@
-"""The ways from base to goal that go differently round the obstacles: shortest paths of the medial axis."""
+"""The ways from base to goal that go differently round the obstacles: short paths of the medial axis."""
 
 from __future__ import annotations
 
 import contextlib
 import itertools
 import math
-from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
 from scipy.linalg import solveh_banded
-from scipy.spatial import Delaunay, KDTree
 from shapely.geometry import LineString, Point
 
 from hrsnake_env.maze import Maze
 from planners.inset import inset_maze
-from planners.kernels.types import BoolArray, FloatArray, IntArray
+from planners.kernels.types import FloatArray
+from planners.medial_axis import MedialAxis, chains, medial_axis
 from planners.path import arclength, resampled
 
 __all__ = ["Route", "routes", "signature"]
 
-CRAMP = 0.5
-"""Weight of narrowness: a way as wide as this many link lengths costs twice its length."""
-
-COARSEST = 1.0 / 60.0
-"""Largest spacing of the sites on the walls, in sizes of the maze."""
+CRAMP = 1.0
+"""A way as wide as this many link lengths costs twice its length. Of the first three ways in 24 halls of
+pillars (links of 250 and 300 px), the sweep does not pass 5 of 72 with 0.5, 2 with 1 and 2 with 2."""
 
 FINEST = 0.01
-"""Smallest spacing of the sites, in link lengths; walls nearer to one another leave no way."""
-
-MOST_SITES = 30_000
-"""The sites are not refined beyond this number."""
-
-NEIGHBOURS = 8
-"""Sites among which the nearest one on another wall is looked for."""
-
-KEPT = 0.75
-"""Share of the medial axis' clearance that a tightened line keeps."""
-
-STRAIGHT = 0.5
-"""Length in front of the base, in link lengths, that is not moved off the base heading."""
-
-AMPLE = 0.5
-"""Clearance, in link lengths, above which a route need not stay in the middle."""
-
-POINTS_PER_WIDTH = 8.0
-"""Points of a route per passage width."""
-
-FEWEST_POINTS, MOST_POINTS = 100, 1500
-"""Points of a route."""
-
-PASSES = 4
-"""Times that the discs are laid anew round the tightened points."""
-
-STIFFNESS = 100.0
-"""Of the band: it smooths over this many points squared."""
-
-LAST_STIFFNESS = 2.0
-"""Of the last round, which no disc stops: it rounds the kinks where discs end."""
-
-IN_SIGHT = 50
-"""Vertices of the axis among which one in sight of the base or the goal is looked for."""
+"""Smallest spacing of the sites on the walls, in link lengths; walls nearer to one another leave no way."""
 
 FRONT = 0.9
 """Where the first link is taken to end, of the way that is free in front of the base."""
 
-ROUNDS = 12
-"""Rounds of tightening and putting back into the discs."""
+STRAIGHT = 0.5
+"""How much of that way is not moved off the base heading."""
+
+FEWEST_POINTS, MOST_POINTS, POINTS_PER_WIDTH = 100, 1500, 8.0
+"""Points of a tightened line; between these bounds, as many per width of its narrow parts."""
+
+KEPT = 0.75
+"""Share of the clearance of the medial axis that a tightened line keeps."""
+
+AMPLE = 0.5
+"""Clearance, in link lengths, that is always enough."""
+
+PASSES, ROUNDS = 4, 12
+"""The discs are laid round the points so many times; in between, the band is pulled so many times."""
+
+STIFFNESS = 100.0
+"""The square of how many points on each side pull at a point."""
+
+LAST_STIFFNESS = 2.0
+"""The same for the last pull, which no disc stops: it rounds the kinks where the discs end."""
 
 RAY_ANGLE = 1.0 / math.sqrt(2.0)
 """Direction of the rays of the signature, in rad: no drawn maze has two holes in line with it."""
@@ -106,10 +88,9 @@ class Route:
 def routes(maze: Maze, link_length: float, *, link_radius: float = 0.0) -> Iterator[Route]:
     """Yield ways from base to goal of different homotopy classes, the most promising first.
 
-    The dual graph of a Delaunay triangulation of the free space, with vertices in the circumcentres, is its
-    medial axis (the Voronoi diagram of the walls' sites). Loopless paths of this graph are of different
-    classes; they come in the order of their length [1]_, where a stretch ds of width w counts
-    (1 + (c L / w)^2) ds for links of length L.
+    The free space can be shrunk to its medial axis, so loopless paths of the axis are of different classes.
+    They come in the order of their length [1]_, where a stretch ds of width w counts (1 + (c L / w)^2) ds for
+    links of length L; each is then tightened like a rubber band that keeps its clearance.
 
     Parameters
     ----------
@@ -121,7 +102,9 @@ def routes(maze: Maze, link_length: float, *, link_radius: float = 0.0) -> Itera
     Yields
     ------
     route : Route
-        The next one, computed when it is asked for. A class that winds round an obstacle is not among them.
+        The next one, computed when it is asked for. Classes that pass a junction of the axis twice, as those
+        that wind round an obstacle, are not among them, nor are ways through gaps narrower than a hundredth
+        of a link.
 
     References
     ----------
@@ -130,23 +113,28 @@ def routes(maze: Maze, link_length: float, *, link_radius: float = 0.0) -> Itera
     import networkx as nx  # takes a quarter of a second, which planners without routes need not spend
 
     inset = inset_maze(maze, link_radius)
-    axis = None if inset is None else _axis_with_ends(inset, link_length)
-    if inset is None or axis is None:
+    if inset is None:
         return
-    ends = (len(axis.links) - 2, len(axis.links) - 1)
-    chains = _chains(axis.links, ends)
+
+    def price(clearance: FloatArray) -> FloatArray:
+        return np.asarray(1.0 + (0.5 * CRAMP * link_length / clearance) ** 2)
+
+    ends = np.stack([_front(inset, link_length), inset.goal])
+    axis = medial_axis(inset, ends, price, FINEST * link_length)
+    if axis is None:
+        return
+    parts = chains(axis)
     graph = nx.Graph()
-    graph.add_nodes_from(ends)
-    for number, chain in enumerate(chains):
+    graph.add_nodes_from(axis.terminals)
+    for number, chain in enumerate(parts):
         cost = sum(axis.links[a][b] for a, b in itertools.pairwise(chain))
         # Two chains may join the same junctions: a node within each tells them apart.
         graph.add_edge(chain[0], -1 - number, cost=0.5 * cost)
         graph.add_edge(-1 - number, chain[-1], cost=0.5 * cost)
     seen: set[tuple[int, ...]] = set()
     with contextlib.suppress(nx.NetworkXNoPath):
-        for way in nx.shortest_simple_paths(graph, *ends, weight="cost"):
-            line = _line(inset, axis, chains, way)
-            route = _route(inset, line, link_length)
+        for way in nx.shortest_simple_paths(graph, *axis.terminals, weight="cost"):
+            route = _route(inset, _line(inset, axis, parts, way), link_length)
             if route is not None and route.signature not in seen:
                 seen.add(route.signature)
                 yield route
@@ -179,7 +167,7 @@ def signature(maze: Maze, line: FloatArray) -> tuple[int, ...]:
     frame = np.array(
         [[math.cos(RAY_ANGLE), -math.sin(RAY_ANGLE)], [math.sin(RAY_ANGLE), math.cos(RAY_ANGLE)]]
     )
-    (places, origins) = (np.asarray(line) @ frame, holes @ frame)
+    places, origins = np.asarray(line) @ frame, holes @ frame
     # A point on a ray counts as on its left: it is crossed once or not at all.
     left = places[:, None, 1] >= origins[None, :, 1]
     segment, hole = np.nonzero(left[1:] != left[:-1])
@@ -199,179 +187,23 @@ def signature(maze: Maze, line: FloatArray) -> tuple[int, ...]:
     return tuple(word)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _Axis:
-    """Hold the medial axis: vertices, shape (n, 2), in maze units, and what the links of each cost."""
-
-    places: FloatArray
-    links: list[dict[int, float]]
-
-
-def _axis_with_ends(maze: Maze, link_length: float) -> _Axis | None:
-    """Compute the medial axis with the end of the first link and the goal as its last two vertices."""
-    axis = _joined(_medial_axis(maze, link_length), maze, _front(maze, link_length), link_length)
-    return None if axis is None else _joined(axis, maze, maze.goal, link_length)
-
-
-def _line(maze: Maze, axis: _Axis, chains: list[list[int]], way: list[int]) -> FloatArray:
-    """Lay a line from the base along a way: junctions and, as -1 - k, chains between them, in turn."""
-    vertices = [way[0]]
-    for node in way[1::2]:
-        chain = chains[-1 - node]
-        vertices += (chain if chain[0] == vertices[-1] else chain[::-1])[1:]
-    return np.concatenate([maze.base_pose[None, :2], axis.places[vertices]])
-
-
-def _medial_axis(maze: Maze, link_length: float) -> _Axis:
-    shapely.prepare(maze.free_space)
-    sites, crowding = _wall_sites(maze, FINEST * link_length)
-    triangulation = Delaunay(sites)
-    corners: FloatArray = sites[triangulation.simplices]
-    centres, radii, flat = _circumcircles(corners)
-    middle = corners.mean(axis=1)
-    inner = shapely.contains_xy(maze.free_space, middle[:, 0], middle[:, 1]) & ~flat
-    near = np.repeat(np.arange(len(inner)), 3)
-    far = triangulation.neighbors.ravel()
-    shared = triangulation.simplices[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
-    link = (near < far) & inner[near] & inner[far]
-    # Where the sites are too sparse for walls this near to one another, a triangle may reach through a wall.
-    doubtful = np.flatnonzero(link & crowding[shared].any(axis=1))
-    link[doubtful] = shapely.covers(maze.free_space, shapely.linestrings(sites[shared[doubtful]]))
-    near, far, shared = near[link], far[link], shared[link]
-    gate = sites[shared].mean(axis=1)
-    straddled = ((centres[near] - gate) * (centres[far] - gate)).sum(axis=1) < 0.0
-    half = 0.5 * np.hypot(*(sites[shared[:, 0]] - sites[shared[:, 1]]).T)
-    radius = np.where(straddled, half, np.minimum(radii[near], radii[far]))
-    costs = np.hypot(*(centres[near] - centres[far]).T) * _cramped(radius, link_length)
-    links: list[dict[int, float]] = [{} for _ in centres]
-    for a, b, cost in zip(near.tolist(), far.tolist(), costs.tolist(), strict=True):
-        links[a][b] = links[b][a] = cost
-    return _Axis(places=centres, links=links)
-
-
-def _cramped(radius: FloatArray, link_length: float) -> FloatArray:
-    """Return what a unit of length costs where the clearance is so large, shape (n,) -> (n,)."""
-    return np.asarray(1.0 + (0.5 * CRAMP * link_length / radius) ** 2)
-
-
-def _wall_sites(maze: Maze, finest: float) -> tuple[FloatArray, BoolArray]:
-    """Place sites on the walls, at most as far apart as other walls are away.
-
-    Until the circle over two neighbours holds no third site, too: then each wall is a chain of edges of the
-    Delaunay triangulation, and no vertex or edge of the Voronoi diagram of the free side crosses a wall.
-
-    Returns
-    -------
-    sites : array, shape (n, 2)
-        In maze units.
-    crowding : array, shape (n,)
-        Whether a site is in such a circle, which could not be emptied.
-    """
-    walls = maze.walls
-    start, span = walls[:, 0], walls[:, 1] - walls[:, 0]
-    before, after = _neighbours(maze)
-    pieces = np.ceil(np.hypot(*span.T) / (COARSEST * maze.size)).astype(np.int64)
-    wall = np.repeat(np.arange(len(walls)), pieces)
-    first = (np.arange(len(wall)) - np.repeat(np.cumsum(pieces) - pieces, pieces)) / pieces[wall]
-    width = 1.0 / pieces[wall]
-    while True:
-        sites = start[wall] + first[:, None] * span[wall]
-        length = width * np.hypot(*span[wall].T)
-        middle = start[wall] + (first + 0.5 * width)[:, None] * span[wall]
-        distance, nearest = KDTree(sites).query(middle, k=min(NEIGHBOURS, len(sites)))
-        owner = wall[nearest]
-        apart = (owner != wall[:, None]) & (owner != before[wall][:, None]) & (owner != after[wall][:, None])
-        inside = distance < 0.499 * length[:, None]
-        split = (inside | (apart & (distance < length[:, None]))).any(axis=1) & (length > finest)
-        if not split.any() or len(sites) > MOST_SITES:
-            crowding = np.zeros(len(sites), dtype=bool)
-            crowding[nearest[inside]] = True
-            return sites, crowding
-        width = np.where(split, 0.5 * width, width)
-        wall = np.concatenate([wall, wall[split]])
-        first = np.concatenate([first, first[split] + width[split]])
-        width = np.concatenate([width, width[split]])
-
-
-def _neighbours(maze: Maze) -> tuple[IntArray, IntArray]:
-    """Return the wall before and the wall after each wall, on its ring."""
-    before, after, n = [], [], 0
-    for ring in maze.rings:
-        own = np.arange(n, n + len(ring) - 1)
-        before.append(np.roll(own, 1))
-        after.append(np.roll(own, -1))
-        n += len(own)
-    return np.concatenate(before), np.concatenate(after)
-
-
-def _circumcircles(corners: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Compute centre and radius of the circles through triangles, shape (n, 3, 2), and which are flat."""
-    b, c = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    bb, cc = (b * b).sum(axis=1), (c * c).sum(axis=1)
-    cross = b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0]
-    flat = np.abs(cross) <= 1e-9 * np.maximum(bb, cc)
-    double = 2.0 * np.where(flat, 1.0, cross)
-    offset = np.column_stack([c[:, 1] * bb - b[:, 1] * cc, b[:, 0] * cc - c[:, 0] * bb]) / double[:, None]
-    return corners[:, 0] + offset, np.hypot(*offset.T), flat
-
-
-def _joined(axis: _Axis, maze: Maze, point: FloatArray, link_length: float) -> _Axis | None:
-    """Add a point as the axis' last vertex, linked to the nearest one in sight; None if there is none."""
-    linked = np.array([k for k, near in enumerate(axis.links) if near], dtype=np.int64)
-    if len(linked) == 0:
-        return None
-    away = np.hypot(*(axis.places[linked] - point).T)
-    nearest = np.argsort(away, kind="stable")[:IN_SIGHT]
-    sights = np.stack([np.broadcast_to(point, (len(nearest), 2)), axis.places[linked[nearest]]], axis=1)
-    seen = nearest[shapely.covers(maze.free_space, shapely.linestrings(sights))]
-    if len(seen) == 0:
-        return None
-    radius = shapely.distance(shapely.points(point[None]), maze.free_space.boundary)
-    cost = float(away[seen[0]] * _cramped(radius, link_length)[0])
-    new, old = len(axis.links), int(linked[seen[0]])
-    links = [*axis.links, {old: cost}]
-    links[old] = links[old] | {new: cost}
-    return _Axis(places=np.concatenate([axis.places, point[None]]), links=links)
-
-
 def _front(maze: Maze, link_length: float) -> FloatArray:
     """Return where the first link ends when the arm comes straight out of the feeder; short of a wall."""
-    x, y, heading = maze.base_pose
+    base, heading = maze.base_pose[:2], maze.base_pose[2]
     along = np.array([math.cos(heading), math.sin(heading)])
-    base = np.array([x, y])
-    wall = LineString([base, base + link_length * along]).intersection(maze.free_space.boundary)
-    free = link_length if wall.is_empty else Point(x, y).distance(wall)
+    reach = min(link_length, math.dist(base, maze.goal))
+    wall = LineString([base, base + reach * along]).intersection(maze.free_space.boundary)
+    free = reach if wall.is_empty else Point(base).distance(wall)
     return np.asarray(base + FRONT * free * along)
 
 
-def _chains(links: list[dict[int, float]], ends: tuple[int, int]) -> list[list[int]]:
-    """Return the chains of vertices between junctions, without the dead ends.
-
-    A pocket's branch leads nowhere; when it is cut off, what it branched from is no junction any more.
-    """
-    near = [set(others) for others in links]
-    leaves = deque(k for k, others in enumerate(near) if len(others) == 1 and k not in ends)
-    while leaves:
-        leaf = leaves.popleft()
-        for other in near[leaf]:
-            near[other].discard(leaf)
-            if len(near[other]) == 1 and other not in ends:
-                leaves.append(other)
-        near[leaf] = set()
-    chains, walked = [], set()
-    for junction in range(len(near)):
-        if len(near[junction]) == 2 and junction not in ends:
-            continue
-        for neighbour in sorted(near[junction]):
-            if (junction, neighbour) in walked:
-                continue
-            chain = [junction, neighbour]
-            while len(near[chain[-1]]) == 2 and chain[-1] not in ends:
-                chain += near[chain[-1]] - {chain[-2]}
-            walked.add((chain[-1], chain[-2]))
-            if chain[-1] != junction:
-                chains.append(chain)
-    return chains
+def _line(maze: Maze, axis: MedialAxis, parts: list[list[int]], way: list[int]) -> FloatArray:
+    """Lay a line from the base along a way: junctions and, as -1 - k, chains between them, in turn."""
+    vertices = [way[0]]
+    for node in way[1::2]:
+        chain = parts[-1 - node]
+        vertices += (chain if chain[0] == vertices[-1] else chain[::-1])[1:]
+    return np.concatenate([maze.base_pose[None, :2], axis.places[vertices]])
 
 
 def _route(maze: Maze, line: FloatArray, link_length: float) -> Route | None:
@@ -395,8 +227,9 @@ def _tightened(maze: Maze, line: FloatArray, link_length: float) -> FloatArray:
     narrow = 2.0 * float(np.quantile(_clearance(maze, resampled(line, length / FEWEST_POINTS)), 0.1))
     spacing = min(max(narrow / POINTS_PER_WIDTH, length / MOST_POINTS), length / FEWEST_POINTS)
     points = resampled(line, spacing)
-    floor = np.minimum(KEPT * _clearance(maze, points), AMPLE * link_length)
-    floor[arclength(points) < STRAIGHT * link_length] = np.inf
+    # Nearer to a corner than two points are to each other, the line between them would cut it.
+    floor = np.minimum(KEPT * _clearance(maze, points), max(AMPLE * link_length, 2.0 * spacing))
+    floor[arclength(points) < STRAIGHT * math.dist(line[0], line[1])] = np.inf
     floor[-1] = np.inf
     for _ in range(PASSES):
         centres, reach = points, np.maximum(_clearance(maze, points) - floor, 0.0)
