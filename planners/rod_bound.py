@@ -23,6 +23,7 @@ from hrsnake_env.maze import Maze
 from planners.inset import inset_maze
 from planners.kernels.rod import free_directions
 from planners.kernels.rod_search import BASE, FIRST, GOAL, PER_TRIANGLE, Frontier, Task, search
+from planners.kernels.rod_shorten import shorten
 from planners.kernels.rod_space import GAPS, SLACK, RodSpace, refine, update_headings
 from planners.kernels.types import FloatArray, IntArray
 from planners.problem import Progress
@@ -43,6 +44,9 @@ FINEST = 1e-6
 
 FRACTIONS = (0.5, 0.3, 0.7)
 """Where in the interval to ask: the middle, or where it is too close to the limit, off it."""
+
+SHORTENINGS = 4
+"""How often a path is shortened; each time stretches can grow together further."""
 
 PART = 1.0 / 16.0
 """Smallest triangles of a question in parts of the interval: a limit that close is not worth deciding."""
@@ -469,4 +473,6 @@ def _path(space: RodSpace, task: Task, nodes: IntArray, headings: FloatArray) ->
         if node not in (BASE, GOAL):
             places.append((*space.centres[(node - FIRST) // PER_TRIANGLE].tolist(), heading))
     array = np.array(places)
+    for _ in range(SHORTENINGS):
+        array = shorten(array, task.length, space)
     return RodPath(length=task.length, tails=array[:, :2], headings=array[:, 2])

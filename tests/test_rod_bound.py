@@ -216,7 +216,7 @@ def test_a_rod_longer_than_the_straight_way_does_not_pass():
     assert rod_passes(fig19(), 1596.0).passes is Passage.NO
 
 
-def test_the_rods_path_through_pillars_is_free_and_not_much_longer_than_the_way():
+def test_the_rods_path_through_pillars_is_free_and_short():
     rng = np.random.default_rng(3)
     free = box(0, 0, 900, 600)
     for x in range(250, 850, 150):
@@ -227,7 +227,7 @@ def test_the_rods_path_through_pillars_is_free_and_not_much_longer_than_the_way(
     verdict = rod_passes(maze, 120.0)
     assert verdict.passes is Passage.YES
     assert_path_is_free(maze, verdict.path)
-    assert np.linalg.norm(np.diff(verdict.path.tails, axis=0), axis=1).sum() < 2.0 * 750.0
+    assert np.linalg.norm(np.diff(verdict.path.tails, axis=0), axis=1).sum() < 1.2 * 750.0
 
 
 def test_without_time_the_interval_is_the_first_one():
