@@ -6,13 +6,16 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
-from scipy.spatial import Delaunay, KDTree
 
 from hrsnake_env.maze import Maze
 from planners.kernels.types import BoolArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from scipy.spatial import Delaunay
 
 __all__ = ["MedialAxis", "chains", "medial_axis"]
 
@@ -73,6 +76,8 @@ def medial_axis(
     axis : MedialAxis or None
         None if a terminal sees nothing of it.
     """
+    from scipy.spatial import Delaunay  # takes a tenth of the time of importing the planners
+
     shapely.prepare(maze.free_space)
     sites, crowding = _wall_sites(maze, finest)
     triangulation = Delaunay(sites)
@@ -161,6 +166,8 @@ def _wall_sites(maze: Maze, finest: float) -> tuple[FloatArray, BoolArray]:
     crowding : array, shape (n,)
         Whether a site is in such a circle, which could not be emptied.
     """
+    from scipy.spatial import KDTree
+
     walls = maze.walls
     start, span = walls[:, 0], walls[:, 1] - walls[:, 0]
     before, after = _neighbours(maze)
