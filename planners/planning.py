@@ -28,6 +28,7 @@ from planners.problem import (
 from planners.query import Query
 from planners.routes import routes, signature
 from planners.sweep_planner import longest_past, plan_sweep
+from planners.track_planner import plan_track
 from planners.validation import validate
 
 __all__ = ["PLANNERS", "TIME_BUDGET", "plan"]
@@ -35,6 +36,7 @@ __all__ = ["PLANNERS", "TIME_BUDGET", "plan"]
 PLANNERS: dict[str, Callable[[Query], Candidate]] = {
     "beam": plan_beam,
     "sweep": plan_sweep,
+    "track": plan_track,
 }
 """All planners by name."""
 

@@ -1,0 +1,114 @@
+"""From a joint track to a motion: every joint runs on one curve, and every link is an exact chord of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from planners.kernels import feeding as kernel
+from planners.kernels.types import FloatArray
+from planners.problem import Motion
+
+__all__ = ["Feeding", "motion_along"]
+
+STEP = 0.03
+"""Largest movement of a joint between poses, in link lengths."""
+
+POSES_PER_LINK = 120
+"""Room for poses per link length of track, at first."""
+
+MAX_POSES = 400_000
+"""Largest number of poses."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Feeding:
+    """Hold what came of feeding an arm along a track.
+
+    Parameters
+    ----------
+    poses : array, shape (n_poses, n_links + 1, 2)
+        As far as it went; the tip last.
+    ending : int
+        One of DONE, JUMP and FULL of `planners.kernels.feeding`.
+    place : tuple of two floats
+        Where the tip was at the end, in maze units.
+    """
+
+    poses: FloatArray
+    ending: int
+    place: tuple[float, float]
+
+
+def feed(track: FloatArray, link_length: float, base_pose: FloatArray, step: float = STEP) -> Feeding:
+    """Feed an arm along a track.
+
+    Parameters
+    ----------
+    track : array, shape (n, 2)
+        A polyline in maze units that begins at the base and is straight for one link length.
+    link_length : float
+        In maze units.
+    base_pose : array, shape (3,)
+        Base position and heading.
+    step : float
+        Largest movement of a joint between poses, in link lengths.
+    """
+    track, arc = _subdivided(track, link_length)
+    n_links = math.floor(arc[-1] / link_length) + 2
+    room = math.ceil(POSES_PER_LINK * n_links)
+    while True:
+        poses = np.empty((room, n_links + 1, 2))
+        n, ending, x, y = kernel.feed_along(track, arc, link_length, base_pose, step * link_length, poses)
+        if ending != kernel.FULL or room >= MAX_POSES:
+            break
+        room = min(4 * room, MAX_POSES)
+    poses = poses[:n]
+    cos, sin = math.cos(base_pose[2]), math.sin(base_pose[2])
+    # Links that never leave the feeder are not needed.
+    along = (poses[:, :, 0] - base_pose[0]) * cos + (poses[:, :, 1] - base_pose[1]) * sin
+    across = np.abs((poses[:, :, 1] - base_pose[1]) * cos - (poses[:, :, 0] - base_pose[0]) * sin)
+    inside = (along <= 1e-9 * link_length) & (across <= 1e-9 * link_length)
+    unused = int(np.argmin(inside.all(axis=0)[1:]))
+    return Feeding(poses=poses[:, unused:], ending=ending, place=(x, y))
+
+
+def _subdivided(track: FloatArray, link_length: float) -> tuple[FloatArray, FloatArray]:
+    """Return the same polyline without segments of no length or over a quarter link, and its arclength."""
+    sizes = np.hypot(*np.diff(track, axis=0).T)
+    track = track[np.concatenate([[True], sizes > 1e-9 * link_length])]
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(track, axis=0).T))])
+    parts = np.ceil(np.diff(arc) / (0.25 * link_length)).astype(np.int64)
+    index = np.append(np.repeat(np.arange(len(parts)), parts), len(parts))
+    first = np.concatenate([[0], np.cumsum(parts)])
+    share = (np.arange(len(index)) - first[index]) / np.append(parts, 1)[index]
+    after = np.minimum(index + 1, len(track) - 1)
+    track = track[index] + share[:, None] * (track[after] - track[index])
+    return track, arc[index] + share * (arc[after] - arc[index])
+
+
+def motion_along(
+    track: FloatArray, link_length: float, base_pose: FloatArray, step: float = STEP
+) -> Motion | None:
+    """Return the motion of an arm fed along a track; None if a joint would jump.
+
+    Parameters
+    ----------
+    track : array, shape (n, 2)
+        A polyline in maze units that begins at the base and is straight for one link length.
+    link_length : float
+        In maze units.
+    base_pose : array, shape (3,)
+        Base position and heading.
+    step : float
+        Largest movement of a joint between poses, in link lengths.
+
+    Examples
+    --------
+    >>> motion_along(np.array([[0.0, 0.0], [2.5, 0.0]]), 1.0, np.zeros(3))
+    Motion(89 poses, 3 links of 1)
+    """
+    fed = feed(track, link_length, base_pose, step)
+    return None if fed.ending != kernel.DONE else Motion.from_joints(fed.poses, link_length, base_pose)
