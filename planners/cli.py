@@ -1,4 +1,4 @@
-"""The `hrsnake` command: plan, validate, simulate, draw, demo.
+"""The `hrsnake` command: plan, longest, validate, simulate, draw, demo.
 
 Exit codes: 0 done; 2 bad input, one sentence on stderr; 3 no plan, a motion that is not valid, or a verdict
 that is not clean. `--json` prints one JSON object instead of tables.
@@ -7,6 +7,7 @@ that is not clean. `--json` prints one JSON object instead of tables.
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -19,8 +20,9 @@ import typer
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import MAZES, Maze
-from planners import tables
-from planners.planning import PLANNERS, plan
+from planners import longest, tables
+from planners.length_trials import motion_path
+from planners.planning import PLANNERS, TIME_BUDGET, plan
 from planners.problem import Motion, PlanningResult, Progress
 from planners.validation import validate
 
@@ -48,6 +50,9 @@ MotionArgument = Annotated[Path, typer.Argument(metavar="MOTION", help="A motion
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")]
 RadiusOption = Annotated[float, typer.Option("--link-radius", help="Radius of the links, in maze units.")]
 LimitOption = Annotated[float | None, typer.Option("--joint-limit", help="Largest joint angle, in degrees.")]
+PlannerOption = Annotated[str, typer.Option("--planner", help=f"auto, {', '.join(PLANNERS)}.")]
+
+PICTURES = (".png", ".svg", ".pdf")
 
 
 @app.callback(invoke_without_command=True)
@@ -64,27 +69,95 @@ def plan_command(
     links: Annotated[int | None, typer.Option("--links", help="By default as many as it takes.")] = None,
     link_radius: RadiusOption = 0.0,
     joint_limit: LimitOption = None,
-    planner: Annotated[str, typer.Option("--planner", help=f"auto, {', '.join(PLANNERS)}.")] = "auto",
+    planner: PlannerOption = "auto",
+    time_budget: Annotated[
+        float, typer.Option("--time-budget", help="Seconds that planning may take.")
+    ] = TIME_BUDGET,
+    warm_start: Annotated[
+        Path | None, typer.Option("--warm-start", help="A motion (.npz) in a similar maze, to start from.")
+    ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Write the motion (.npz).")] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", help="Draw five poses, or what was in the way (.png).")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Plan a motion from the feeder to the goal, and check it exactly."""
     _check_output(out)
+    _check_output(picture, PICTURES)
     world, arm = Maze.load(maze), _arm(link_length, links, link_radius, joint_limit)
+    start = None if warm_start is None else Motion.load(warm_start)
     with _progress(as_json) as progress:
-        result = plan(world, arm, planner, progress=progress)
+        result = plan(world, arm, planner, time_budget=time_budget, warm_start=start, progress=progress)
     if result.motion is not None and out is not None:
         result.motion.save(out)
+    if picture is not None:
+        _draw_result(world, arm, result, picture)
     _print(
         as_json,
         {
             **result.to_dict(),
             "validation": _report_dict(result),
             "out": _name(out, result.motion is not None),
+            "picture": _name(picture),
         },
-        lambda: tables.show_plan(world, arm, result, out),
+        lambda: tables.show_plan(world, arm, result, out, picture),
     )
     if not result.solved:
+        raise typer.Exit(NOT_CLEAN)
+
+
+@app.command("longest")
+def longest_command(
+    maze: MazeArgument,
+    planner: PlannerOption = "auto",
+    link_radius: RadiusOption = 0.0,
+    joint_limit: LimitOption = None,
+    lengths: Annotated[
+        str, typer.Option("--lengths", help="Further lengths for the table, as 100,200,300.")
+    ] = "",
+    accuracy: Annotated[
+        float, typer.Option("--accuracy", help="Step of the lengths, as a share.")
+    ] = longest.ACCURACY,
+    time_budget: Annotated[
+        float, typer.Option("--time-budget", help="Seconds that planning may take for each length.")
+    ] = longest.TIME_BUDGET,
+    out: Annotated[Path | None, typer.Option("--out", help="Write the motion (.npz).")] = None,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="Draw what each length needs (.png, .svg, .pdf).")
+    ] = None,
+    state: Annotated[
+        Path | None,
+        typer.Option("--state", help="File (.json) from which the next run goes on."),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Find the longest link that reaches the goal, and what arms with shorter links need. Ctrl-C: so far."""
+    _check_output(out)
+    _check_output(plot, PICTURES)
+    _check_output(state, (".json",))
+    world, limit = Maze.load(maze), None if joint_limit is None else math.radians(joint_limit)
+    with _one_bar(as_json) as progress:
+        result = longest.longest_link(
+            world,
+            planner,
+            link_radius=link_radius,
+            joint_limit=limit,
+            accuracy=accuracy,
+            lengths=_lengths(lengths),
+            time_budget=time_budget,
+            state=state,
+            progress=progress,
+        )
+    files = [*_write_longest(world, result, out, plot), *_state_files(state)]
+    _print(
+        as_json,
+        {**result.to_dict(), "files": [str(path) for path in files]},
+        lambda: tables.show_longest(world, result, files),
+    )
+    if not result.complete:
+        raise typer.Exit(INTERRUPTED)
+    if result.motion is None:
         raise typer.Exit(NOT_CLEAN)
 
 
@@ -150,7 +223,7 @@ def draw_command(
     if moved is not None:
         moved.check_maze(world)
     picture = Path(f"{world.name}.png") if out is None else out
-    _check_output(picture, (".png", ".svg", ".pdf"))
+    _check_output(picture, PICTURES)
     summary = draw_geometry(world, moved, picture, link_radius)
     _print(as_json, {**summary, "out": str(picture)}, lambda: tables.show_geometry(world, summary, picture))
 
@@ -196,8 +269,39 @@ def _complain(message: str) -> int:
 
 
 def _arm(link_length: float, links: int | None, link_radius: float, joint_limit: float | None) -> ArmSpec:
-    limit = None if joint_limit is None else joint_limit * 3.141592653589793 / 180.0
+    limit = None if joint_limit is None else math.radians(joint_limit)
     return ArmSpec(link_length=link_length, n_links=links, link_radius=link_radius, joint_limit=limit)
+
+
+def _lengths(text: str) -> list[float]:
+    """Read lengths with commas between them."""
+    try:
+        return [float(part) for part in text.split(",")] if text.strip() else []
+    except ValueError:
+        raise InputError(
+            f"Expected lengths as numbers with commas between them (100,200,300), got '{text}'."
+        ) from None
+
+
+def _write_longest(
+    maze: Maze, result: longest.LongestLink, out: Path | None, plot: Path | None
+) -> list[Path]:
+    """Write motion and picture, as far as they are wanted and there; return their names."""
+    written = []
+    if out is not None and result.motion is not None:
+        result.motion.save(out)
+        written.append(out)
+    if plot is not None:
+        from planners.longest_chart import draw_longest
+
+        draw_longest(maze, result, plot)
+        written.append(plot)
+    return written
+
+
+def _state_files(state: Path | None) -> list[Path]:
+    """Return the files of a search that are there."""
+    return [] if state is None else [path for path in (state, motion_path(state)) if path.exists()]
 
 
 def _print(as_json: bool, data: dict[str, Any], show: Callable[[], None]) -> None:
@@ -256,6 +360,26 @@ def _progress(quiet: bool) -> Iterator[Progress]:
             bars.update(tasks[stage], completed=share)
 
         yield tell
+
+
+@contextmanager
+def _one_bar(quiet: bool) -> Iterator[Progress]:
+    """Show one bar on stderr whose text is the news, where somebody can see it."""
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bars
+
+    console = Console(stderr=True)
+    columns = (BarColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
+    with Bars(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as bars:
+        task = bars.add_task("", total=1.0)
+        yield lambda news, share: bars.update(task, description=news, completed=share)
+
+
+def _draw_result(maze: Maze, arm: ArmSpec, result: PlanningResult, out: Path) -> None:
+    from planners.drawing import draw_result
+
+    draw_result(maze, arm, result, out)
 
 
 def _animate(maze: Maze, episode: Any, out: Path, progress: Progress) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from rich import box
 from rich.console import Console
 from rich.table import Table
@@ -13,6 +14,8 @@ from rich.table import Table
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.contacts import PINCH_TOLERANCE, PinchReport
 from hrsnake_env.maze import Maze
+from planners.length_trials import LengthTrial
+from planners.longest import LongestLink
 from planners.problem import Motion, PlanningResult, ValidationReport
 
 if TYPE_CHECKING:
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = [
     "show_demo",
     "show_geometry",
+    "show_longest",
     "show_plan",
     "show_rows",
     "show_validation",
@@ -95,12 +99,13 @@ def motion_rows(maze: Maze, motion: Motion) -> Rows:
 def plan_rows(maze: Maze, arm: ArmSpec, result: PlanningResult) -> Rows:
     """Write the outcome of planning."""
     yield "status", f"{result.status} (planner: {result.planner})"
+    for number, attempt in enumerate(result.attempts):
+        yield "" if number else "tried", f"{attempt}, {seconds(attempt.seconds)}"
     if result.motion is None:
         yield "maze", maze.name
         yield "link length", f"{arm.link_length:g} {maze.units}"
         yield "reason", result.reason
-        if result.place is not None:
-            yield "place", f"({result.place[0]:.1f}, {result.place[1]:.1f}) {maze.units}"
+        yield from failure_rows(maze, result)
         return
     assert result.report is not None  # a motion is there only if it was validated
     yield from motion_rows(maze, result.motion)
@@ -108,11 +113,33 @@ def plan_rows(maze: Maze, arm: ArmSpec, result: PlanningResult) -> Rows:
     yield from timing_rows(dict(result.timings), result.motion.n_poses)
 
 
-def show_plan(maze: Maze, arm: ArmSpec, result: PlanningResult, out: Path | None) -> None:
+def failure_rows(maze: Maze, result: PlanningResult) -> Rows:
+    """Write where planning ended, what is in the way, and what would pass there."""
+    failure, units = result.failure, maze.units
+    if failure is None:
+        return
+    yield "place", f"({failure.place[0]:.1f}, {failure.place[1]:.1f}) {units}"
+    if failure.path_position is not None:
+        yield "along the path", f"{failure.path_position:.1f} {units} from the base"
+    if failure.link is not None:
+        yield "link", "the one at the tip" if failure.link == 0 else f"{failure.link} behind the tip's"
+    if failure.wall is not None:
+        yield "in the way", _wall(maze, failure.wall)
+    if failure.depth is not None:
+        yield "depth", f"{failure.depth:.4g} {units} in that wall"
+    if result.longest_there is not None:
+        yield "longest link there", f"{result.longest_there:.4g} {units}"
+
+
+def show_plan(
+    maze: Maze, arm: ArmSpec, result: PlanningResult, out: Path | None, picture: Path | None = None
+) -> None:
     """Print the outcome of planning."""
     show_rows("Plan", plan_rows(maze, arm, result))
     if out is not None:
         print(f"Written: {out}" if result.motion is not None else f"Nothing written to {out}: no motion.")
+    if picture is not None:
+        print(f"Written: {picture}")
 
 
 def show_validation(maze: Maze, motion: Motion, report: ValidationReport) -> None:
@@ -203,3 +230,85 @@ def show_demo(demo: Demo) -> None:
     show_rows("Simulation", [*rows, *verdict_rows(demo.maze, demo.episode.report)])
     for path in demo.files:
         print(f"Written: {path}")
+
+
+def longest_rows(maze: Maze, result: LongestLink) -> Rows:
+    """Write the answer: how long a link may be, and how sure that is."""
+    bound, units = result.bound, result.units
+    yield "maze", maze.name
+    if result.length > 0.0:
+        yield "longest link", f"{result.length:.5g} {units}, with a validated motion"
+        yield "index I (Eq. 4)", f"at least {result.index_text}"
+    else:
+        yield "longest link", "none: no length that was tried passes"
+    way = "the straight way in front of the base" if bound.limited_by == "feeder" else "the maze"
+    closer = "" if bound.proven else "; time ended before they were closer"
+    yield (
+        "longest rod that passes",
+        f"from {bound.lower:.5g} to {bound.upper:.5g} {units}, limited by {way}{closer}",
+    )
+    yield "longer links", ", ".join(_longer(result)) or "the next step is longer than any rod that passes"
+    if not result.complete:
+        yield "stopped", "the longest link so far; the search was not over"
+    if result.note:
+        yield "state", result.note
+
+
+def _longer(result: LongestLink) -> Iterable[str]:
+    """Say what is known of the lengths between the longest link and the bound."""
+    failed = [trial for trial in result.failed if trial.link_length <= result.bound.upper]
+    if failed:
+        low, high = failed[0].link_length, failed[-1].link_length
+        span = f"{low:.5g}" if len(failed) == 1 else f"{low:.5g} to {high:.5g}"
+        yield f"{len(failed)} tried ({span} {result.units}): none passes"
+    if result.out_of_time:
+        longest = max(trial.time_budget for trial in result.out_of_time)
+        yield f"{len(result.out_of_time)} undecided within {seconds(longest)} each (try --time-budget)"
+    if result.untried:
+        yield f"{len(result.untried)} not tried"
+
+
+def show_longest(maze: Maze, result: LongestLink, files: Iterable[Path]) -> None:
+    """Print the longest link, and what arms with links of other lengths need."""
+    show_rows("Longest link", longest_rows(maze, result))
+    units = result.units
+    table = Table(title="What each length needs", title_justify="left", box=box.SIMPLE_HEAD)
+    figures = (
+        f"\nlink\n{units}",
+        "\nof the\nbound",
+        "\n\nlinks",
+        "\nactu-\nators",
+        "joint\nrange\ndeg",
+        f"joint\nspeed\ndeg/{units}",
+        "\nturning\ndeg",
+        "\n\nposes",
+    )
+    for heading in figures:
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("\n\noutcome", no_wrap=True)
+    for trial in result.table:
+        chosen = trial.link_length == result.length
+        table.add_row(*_trial_cells(trial, result.bound.upper), style="bold" if chosen else None)
+    Console().print(table)
+    print(
+        f"Actuators: a joint for each link, and the feed. Joint speed: per {units} that the fastest joint "
+        f"travels.\nTurning: over the joints' speed, the least time of the whole motion."
+    )
+    for path in files:
+        print(f"Written: {path}")
+
+
+def _trial_cells(trial: LengthTrial, upper: float) -> list[str]:
+    cells = [f"{trial.link_length:.5g}", f"{trial.link_length / upper:.3f}" if upper > 0.0 else ""]
+    if trial.joint_range is None or trial.joint_speed is None or trial.turning is None:
+        return [*cells, *[""] * 6, str(trial.status)]
+    return [
+        *cells,
+        str(trial.n_links),
+        str(trial.n_actuators),
+        f"{np.degrees(trial.joint_range):.1f}",
+        f"{np.degrees(trial.joint_speed):.3g}",
+        f"{np.degrees(trial.turning):.0f}",
+        str(trial.n_poses),
+        f"passes: {trial.planner}",
+    ]

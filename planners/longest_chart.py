@@ -1,0 +1,85 @@
+"""A chart of what arms need over the length of their links."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from hrsnake_env.files import replacing
+from hrsnake_env.maze import Maze
+from hrsnake_env.rendering import COLOURS
+from planners.longest import LongestLink
+
+__all__ = ["draw_longest"]
+
+
+def draw_longest(maze: Maze, result: LongestLink, out: Path) -> None:
+    """Draw what arms need over the length of their links: number of links, joint range and joint speed.
+
+    Parameters
+    ----------
+    maze : Maze
+        The maze.
+    result : LongestLink
+        Of `longest_link` in that maze.
+    out : Path
+        The picture (.png, .svg, .pdf).
+    """
+    figure = Figure(figsize=(7.0, 6.4), dpi=130, layout="constrained")
+    FigureCanvasAgg(figure)
+    every = list(figure.subplots(3, 1, sharex=True))
+    solved = [trial for trial in result.trials if trial.passes]
+    lengths = np.array([trial.link_length for trial in solved])
+    curves = {
+        "links needed": [trial.n_links for trial in solved],
+        "joint range\n(deg)": np.degrees([trial.joint_range or 0.0 for trial in solved]),
+        f"joint speed\n(deg per {maze.units} of travel)": np.degrees(
+            [trial.joint_speed or 0.0 for trial in solved]
+        ),
+    }
+    for axes, (label, values) in zip(every, curves.items(), strict=True):
+        axes.plot(lengths, values, color=COLOURS["arm"], linewidth=1.0, marker="o", markersize=3.5)
+        axes.set_ylabel(label)
+        axes.set_ylim(bottom=0.0)
+        axes.grid(color="#e3e5e8", linewidth=0.6)
+        axes.spines[["top", "right"]].set_visible(False)
+        _mark_lengths(axes, result)
+    every[0].legend(loc="upper right", fontsize=8, framealpha=0.9)
+    every[-1].set_xlabel(f"link length ({maze.units})")
+    figure.suptitle(f"{maze.name}: {_sum_up(result)}", fontsize=11)
+    with replacing(out) as part:
+        figure.savefig(part)
+
+
+def _mark_lengths(axes: Axes, result: LongestLink) -> None:
+    """Mark the longest link, the bound, and below them the lengths that failed."""
+    if result.length > 0.0:
+        axes.axvline(result.length, color=COLOURS["goal"], linewidth=1.4, label="longest that passes")
+    axes.axvline(
+        result.bound.upper, color=COLOURS["edge"], linewidth=1.4, linestyle="--", label="no longer rod passes"
+    )
+    failed = [trial.link_length for trial in result.trials if not trial.passes]
+    inside = [length for length in failed if length <= result.bound.upper]
+    if inside:
+        axes.plot(
+            inside,
+            np.zeros(len(inside)),
+            marker="x",
+            linestyle="",
+            markersize=5,
+            color=COLOURS["collision"],
+            transform=axes.get_xaxis_transform(),
+            clip_on=False,
+            zorder=5,
+            label="planning failed",
+        )
+
+
+def _sum_up(result: LongestLink) -> str:
+    if result.length == 0.0:
+        return "no length passes"
+    return f"links of up to {result.length:.4g} {result.units}, index I = {result.index_text}"
