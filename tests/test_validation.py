@@ -16,7 +16,7 @@ from hrsnake_env.arm import ArmSpec, joints_from_configuration
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners import validation
-from planners.checks.gaps import segment_distances, segment_gaps
+from planners.checks.gaps import depths_from_gaps, segment_distances, segment_gaps
 from planners.checks.scene import Scene
 from planners.checks.sieve import SPAN, Sifted, sift
 from planners.problem import Motion
@@ -771,3 +771,19 @@ def test_little_is_left_of_a_motion_through_wide_places():
     assert 0 < (sifted.doubtful(scene) & (scene.arc[:, 1:] > 0.0)).sum() < 0.01 * in_maze
     assert not sifted.open_steps.any()
     assert sum(map(len, sifted.pairs)) == 0
+
+
+def test_a_link_that_turns_all_round_back_to_its_place_is_not_set_aside():
+    maze = hall(box(190, 60, 210, 80), goal=(300.0, 0.0))
+    angles = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 2.0 * math.pi]])
+    motion = Motion.from_configurations([300.0, 300.0], angles, 100.0, maze.base_pose)
+    assert fault(validate(motion, maze), "sweep").link == 2
+
+
+def test_a_gap_bounds_nothing_behind_the_walls():
+    maze, motion = bend()
+    scene = Scene(motion=motion, maze=maze, radius=0.0)
+    gap, still = np.full(2, 5.0), np.zeros(2)
+    points = np.array([200j, 500 + 200j])  # in the corridor, and far outside
+    depth = depths_from_gaps(scene, gap, points, still > 0.0, still, 1.0)
+    assert depth.tolist() == [0.0, math.inf]
