@@ -24,8 +24,8 @@ __all__ = [
 ]
 
 FIG17A_LEG = 748.0
-"""With it 45 links of 245 px just reach. The smoothed global path is then 9,670 px long; with 867 it is as long
-as the paper's, 10,505 px, and takes 49 links."""
+"""With it 45 links of 245 px just reach. The smoothed global path is then 9,670 px long; with 867 it is as
+long as the paper's, 10,505 px, and takes 49 links."""
 
 DIRECTIONS = {"N": (0.0, 1.0), "E": (1.0, 0.0), "S": (0.0, -1.0), "W": (-1.0, 0.0)}
 

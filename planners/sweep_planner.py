@@ -24,7 +24,7 @@ from hrsnake_env.maze import Maze
 from planners.corners import Corner, critical_corners
 from planners.kernels import sweep as kernel
 from planners.kernels.types import FloatArray, IntArray
-from planners.obstruction import deepest_chord, wall_nearest_to
+from planners.obstruction import deepest_link, wall_nearest_to
 from planners.problem import Candidate, Failure, Motion, PlanningStatus, ValidationReport
 from planners.query import Query
 from planners.survey import Geometry
@@ -477,7 +477,7 @@ def longest_past(query: Query, s: float) -> float | None:
 def _failed(query: Query, geometry: Geometry, track: Track | None, timings: dict[str, float]) -> Candidate:
     assert track is not None  # every search grows at least one track
     x, y = (float(value) for value in track.points[track.n - 1])
-    length, path = float(query.arm.link_length), geometry.path
+    path = geometry.path
     status, why = (
         PlanningStatus.DEAD_END,
         "no direction of its link stays free during the next link length of feed",
@@ -486,17 +486,18 @@ def _failed(query: Query, geometry: Geometry, track: Track | None, timings: dict
         why = "the joint track has grown out of all proportion to the path"
     if query.late:
         status, why = PlanningStatus.OUT_OF_TIME, "time was over"
-    begin = int(track.indices[max(track.start[track.n - 1], 0)])
-    end = int(np.searchsorted(path.s, path.s[track.index] + length))
-    obstacle = deepest_chord(geometry.maze, track.aim, begin, min(end, len(path.s) - 1), length)
+    # The link would have to go on from where its start comes next: over the track already drawn.
+    drawn = slice(max(int(track.start[track.n - 1]), 0), track.n)
+    deepest = deepest_link(
+        geometry.maze, track.aim, track.points[drawn], track.indices[drawn], float(query.arm.link_length)
+    )
     what = ""
-    if obstacle is not None and obstacle.depth is not None:
-        (x_wall, y_wall), units = obstacle.place, query.maze.units
+    if deepest is not None:
+        depth, (x_wall, y_wall) = deepest
         what = (
-            f" A link on the way taken there would be {obstacle.depth:.3g} {units} deep in the wall at "
+            f" On its way on, its link would get {depth:.3g} {query.maze.units} deep into the wall at "
             f"({x_wall:.1f}, {y_wall:.1f})."
         )
-        obstacle = dataclasses.replace(obstacle, wall=wall_nearest_to(query.maze, obstacle.place))
     return Candidate(
         status=status,
         reason=f"With the tip at ({x:.1f}, {y:.1f}) {query.maze.units}, {path.s[track.index]:.1f} along the "
@@ -505,8 +506,8 @@ def _failed(query: Query, geometry: Geometry, track: Track | None, timings: dict
             place=(x, y),
             path_position=float(path.s[track.index]),
             link=0,
-            wall=None if obstacle is None else obstacle.wall,
-            depth=None if obstacle is None else obstacle.depth,
+            wall=None if deepest is None else wall_nearest_to(query.maze, deepest[1]),
+            depth=None if deepest is None else deepest[0],
             joints=track.chain[::-1],
         ),
         timings=timings,
