@@ -272,7 +272,9 @@ def show_longest(maze: Maze, result: LongestLink, files: Iterable[Path]) -> None
     """Print the longest link, and what arms with links of other lengths need."""
     show_rows("Longest link", longest_rows(maze, result))
     units = result.units
-    table = Table(title="What each length needs", title_justify="left", box=box.SIMPLE_HEAD)
+    table = Table(
+        title="What each length needs", title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0)
+    )
     figures = (
         f"\nlink\n{units}",
         "\nof the\nbound",

@@ -88,6 +88,70 @@ def test_a_motion_that_is_not_valid_is_exit_code_3(run, motion):
     assert "wall 7 from (-98, 1598) to (-98, 0)" in " ".join(out.split())
 
 
+def test_a_failed_plan_says_and_draws_what_is_in_the_way(run):
+    code, out, _ = run("plan", "S200", "--link-length", 500, "--planner", "sweep", "--picture", "why.png")
+    words = " ".join(out.split())
+    assert code == 3 and "Written: why.png" in out
+    assert "tried sweep: dead end" in words and "px from the base" in words and "in the way wall" in words
+    assert "px in that wall" in words and "longest link there" in words
+    assert Path("why.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_plan_is_drawn_and_a_motion_can_be_started_from(run, motion):
+    motion.save("m.npz")
+    options = ["--warm-start", "m.npz", "--picture", "poses.png"]
+    code, out, _ = run("plan", "fig19", "--link-length", 430, *options)
+    assert code == 0 and "solved" in " ".join(out.split()) and "Written: poses.png" in out
+    assert Path("poses.png").read_bytes().startswith(b"\x89PNG")
+
+
+QUICKLY = ["longest", "L", "--planner", "sweep", "--accuracy", "0.1"]
+
+
+def test_longest_prints_what_each_length_needs_and_writes_what_is_asked_for(run):
+    names = ["--out", "m.npz", "--plot", "l.png", "--state", "s.json", "--lengths", "200,600"]
+    code, out, err = run(*QUICKLY, *names)
+    assert (code, err) == (0, "")
+    assert "longest link" in out and "with a validated motion" in out and "passes: sweep" in out
+    assert "no path" in out  # 600 is longer than any rod that passes
+    written = ["l.png", "m.npz", "s.best.npz", "s.json"]
+    assert all(f"Written: {name}" in out for name in written)
+    assert sorted(path.name for path in Path().iterdir()) == written
+    assert run("validate", "L", "m.npz")[0] == 0
+    code, out, _ = run(*QUICKLY, "--state", "s.json", "--lengths", "200", "--json")
+    data = json.loads(out)
+    assert code == 0 and len(out.splitlines()) == 1 and data["complete"] and data["untried"] == []
+    assert 0.9 < data["index"] <= 1.0 and data["length"] == Motion.load("m.npz").link_length
+    assert [row["link_length"] for row in data["table"] if row["link_length"] == 200.0] == [200.0]
+
+
+def test_longest_leaves_no_file_unless_asked(run):
+    assert run(*QUICKLY)[0] == 0
+    assert list(Path().iterdir()) == []
+
+
+def test_longest_is_exit_code_3_where_no_length_passes(run):
+    code, out, _ = run(*QUICKLY, "--joint-limit", 1, "--out", "m.npz", "--plot", "l.svg")
+    assert code == 3 and "no length that was tried passes" in " ".join(out.split())
+    assert sorted(path.name for path in Path().iterdir()) == ["l.svg"]
+
+
+def test_ctrl_c_gives_the_longest_link_so_far(run, monkeypatch):
+    calls = []
+
+    def interrupted(*arguments, **settings):
+        calls.append(arguments)
+        if len(calls) == 4:
+            raise KeyboardInterrupt
+        return plan(*arguments, **settings)
+
+    monkeypatch.setattr("planners.longest.plan", interrupted)
+    code, out, err = run(*QUICKLY, "--out", "m.npz")
+    assert code == 130 and "the search was not over" in " ".join(out.split()) and "Written: m.npz" in out
+    assert "not tried" in out and err == "hrsnake: stopped; no half-written file is left.\n"
+    assert Motion.load("m.npz").link_length > 0.0
+
+
 def test_draw_writes_a_picture(run, motion):
     motion.save("m.npz")
     code, out, _ = run("draw", "fig19", "m.npz", "--out", "p.svg")
@@ -119,6 +183,7 @@ def write_bad_files(motion):
     Motion.from_configurations([0.0, 1.0], np.zeros((2, 3)), 100.0, (9.0, 9.0, 0.0)).save("foreign.npz")
     Path("broken.geojson").write_text("{")
     Path("list.geojson").write_text("[1, 2]")
+    Path("other.json").write_text("[1, 2]")
     good = fig19().to_geojson()
     for name, change in {
         "base_out": lambda data: data["features"][1]["geometry"].update(coordinates=[-500, 5]),
@@ -144,7 +209,7 @@ def write_bad_files(motion):
 
 
 BAD_INPUT = [
-    ("plan fig20 --link-length 430", "Unknown maze 'fig20'. Available: fig19, L, U40"),
+    ("plan fig20 --link-length 430", "Unknown maze 'fig20'. Available: fig19, fig17a, L, U40"),
     ("plan none.geojson --link-length 430", "Expected a maze file at 'none.geojson', but there is none."),
     ("plan broken.geojson --link-length 430", "Expected JSON in 'broken.geojson'"),
     ("plan list.geojson --link-length 430", "Expected a GeoJSON FeatureCollection, got 'list'."),
@@ -164,10 +229,37 @@ BAD_INPUT = [
     ("plan fig19 --link-length 430 --link-radius -1", "Expected link_radius of at least 0"),
     ("plan fig19 --link-length 430 --link-radius nan", "Expected link_radius of at least 0"),
     ("plan fig19 --link-length 430 --joint-limit 0", "Expected joint_limit in (0, pi] rad"),
-    ("plan fig19 --link-length 430 --links 6", "Expected at least 7 links of 430 px to reach the goal"),
+    ("plan fig19 --link-length 430 --links 4", "Expected at least"),
     ("plan fig19 --link-length 430 --links 0", "Expected n_links to be a whole number of at least 1"),
     ("plan fig19 --link-length 430 --planner best", "Unknown planner 'best'. Available: auto, beam"),
     ("plan fig19 --link-length 430 --out no/m.npz", "Expected an existing folder for 'no/m.npz'"),
+    ("plan fig19 --link-length 430 --picture p.gif", "Expected a file name ending in .png, .svg, .pdf"),
+    ("plan fig19 --link-length 430 --time-budget 0", "Expected a positive time_budget in seconds, got 0.0."),
+    ("plan fig19 --link-length 430 --warm-start none.npz", "Expected a motion file at 'none.npz'"),
+    (
+        "plan fig19 --link-length 430 --warm-start foreign.npz",
+        "Expected a motion from the base of maze 'fig19'",
+    ),
+    ("plan fig19 --link-length 420 --warm-start m.npz", "Expected a warm start with links of 420 px"),
+    ("longest fig20", "Unknown maze 'fig20'. Available: fig19, fig17a, L, U40"),
+    ("longest fig19 --planner best", "Unknown planner 'best'. Available: auto, beam"),
+    (
+        "longest fig19 --lengths 100,long",
+        "Expected lengths as numbers with commas between them (100,200,300)",
+    ),
+    ("longest fig19 --lengths 100,-5", "Expected positive, finite lengths, got -5.0."),
+    ("longest fig19 --lengths nan", "Expected positive, finite lengths, got nan."),
+    ("longest fig19 --accuracy 0", "Expected an accuracy between 0.0001 and 0.5, got 0.0."),
+    ("longest fig19 --time-budget -1", "Expected a positive time_budget in seconds, got -1.0."),
+    ("longest fig19 --link-radius -1", "Expected link_radius of at least 0"),
+    ("longest fig19 --joint-limit 200", "Expected joint_limit in (0, pi] rad"),
+    ("longest fig19 --plot l.jpeg2", "Expected a file name ending in .png, .svg, .pdf, got 'l.jpeg2'."),
+    ("longest fig19 --state no/s.json", "Expected an existing folder for 'no/s.json'"),
+    ("longest fig19 --state s.txt", "Expected a file name ending in .json, got 's.txt'."),
+    (
+        "longest fig19 --state other.json",
+        "Expected a state of `longest`, or a new file name, got 'other.json'",
+    ),
     ("plan fig19 --link-length long", "Invalid value for '--link-length'"),
     ("plan fig19", "Missing option '--link-length'"),
     ("plan", "Missing argument 'MAZE'"),
@@ -234,7 +326,7 @@ def test_the_installed_command_answers(tmp_path):
         pytest.skip("the package is not installed here")
     done = subprocess.run([command, "--help"], capture_output=True, text=True)
     assert done.returncode == 0
-    assert all(name in done.stdout for name in ("plan", "validate", "simulate", "draw", "demo"))
+    assert all(name in done.stdout for name in ("plan", "longest", "validate", "simulate", "draw", "demo"))
     done = subprocess.run([command, "plan", "nowhere", "--link-length", "1"], capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (2, "")
 
