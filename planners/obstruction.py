@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString
 
 from hrsnake_env.maze import Maze
-from planners.kernels.beam import direction_to_distance
-from planners.kernels.types import FloatArray, IntArray
+from planners.kernels.types import FloatArray
 
-__all__ = ["deepest_link", "wall_nearest_to"]
+__all__ = ["least_depth", "wall_nearest_to"]
 
-LINKS, SAMPLES = 64, 96
-"""Links looked at, and points on each: enough to name a wall and to draw a picture."""
+STARTS, HEADINGS, SAMPLES = 32, 16, 48
+"""Starts and headings of a link, and points on it, that are looked at: enough to name a wall and to draw it."""
 
 
 def wall_nearest_to(maze: Maze, place: tuple[float, float]) -> int:
@@ -21,39 +19,36 @@ def wall_nearest_to(maze: Maze, place: tuple[float, float]) -> int:
     return int(np.argmin(shapely.distance(shapely.linestrings(maze.walls), shapely.points(place))))
 
 
-def deepest_link(
-    maze: Maze, aim: FloatArray, starts: FloatArray, indices: IntArray, length: float
+def least_depth(
+    maze: Maze, starts: FloatArray, heading: float, turn: float, length: float
 ) -> tuple[float, tuple[float, float]] | None:
-    """Find the link that would be deepest in a wall if all aimed at a line.
+    """Find how deep a link gets into a wall at least when it turns, wherever its start is meanwhile.
 
     Parameters
     ----------
     maze : Maze
         With the walls.
-    aim : array, shape (n, 2)
-        The line that links aim their ends at.
     starts : array, shape (m, 2)
-        Where links start.
-    indices : array, shape (m,)
-        For each of them, from which point on the line is looked at.
+        Where the link's start may be.
+    heading, turn : float
+        Present heading of the link, and by how much it shall turn, in rad.
     length : float
-        Of the links.
+        Of the link.
 
     Returns
     -------
     depth, place : float and tuple of two floats, or None
-        Both in maze units; None if all these links are free.
+        At the heading at which even the best start is worst, in maze units; None if it can turn freely.
     """
-    worst: tuple[float, tuple[float, float]] = (0.0, (0.0, 0.0))
-    for k in np.unique(np.linspace(0, len(starts) - 1, LINKS).astype(int)):
-        x, y = starts[k]
-        hit, heading = direction_to_distance(aim, x, y, int(indices[k]), length)
-        if not hit:
-            continue
-        link = LineString([(x, y), (x + length * np.cos(heading), y + length * np.sin(heading))])
-        points = shapely.line_interpolate_point(link, np.linspace(0.0, length, SAMPLES))
-        depths = shapely.distance(points, maze.free_space)
-        deepest = int(np.argmax(depths))
-        if depths[deepest] > worst[0]:
-            worst = (float(depths[deepest]), (float(points[deepest].x), float(points[deepest].y)))
-    return worst if worst[0] > 0.0 else None
+    chosen = starts[np.unique(np.linspace(0, len(starts) - 1, STARTS).astype(int))]
+    directions = heading + turn * np.linspace(0.0, 1.0, HEADINGS)
+    along = length * np.linspace(0.0, 1.0, SAMPLES)[:, None]
+    units = np.column_stack([np.cos(directions), np.sin(directions)])
+    places = chosen[:, None, None] + along * units[:, None]  # start, heading, sample
+    depths = shapely.distance(shapely.points(places), maze.free_space)
+    by_start = depths.max(axis=2)
+    direction = int(np.argmax(by_start.min(axis=0)))
+    start = int(np.argmin(by_start[:, direction]))
+    depth, sample = float(by_start[start, direction]), int(np.argmax(depths[start, direction]))
+    x, y = places[start, direction, sample]
+    return None if depth == 0.0 else (depth, (float(x), float(y)))

@@ -24,7 +24,7 @@ from hrsnake_env.maze import Maze
 from planners.corners import Corner, critical_corners
 from planners.kernels import sweep as kernel
 from planners.kernels.types import FloatArray, IntArray
-from planners.obstruction import deepest_link, wall_nearest_to
+from planners.obstruction import least_depth, wall_nearest_to
 from planners.problem import Candidate, Failure, Motion, PlanningStatus, ValidationReport
 from planners.query import Query
 from planners.survey import Geometry
@@ -477,7 +477,7 @@ def longest_past(query: Query, s: float) -> float | None:
 def _failed(query: Query, geometry: Geometry, track: Track | None, timings: dict[str, float]) -> Candidate:
     assert track is not None  # every search grows at least one track
     x, y = (float(value) for value in track.points[track.n - 1])
-    path = geometry.path
+    path, length = geometry.path, float(query.arm.link_length)
     status, why = (
         PlanningStatus.DEAD_END,
         "no direction of its link stays free during the next link length of feed",
@@ -486,17 +486,19 @@ def _failed(query: Query, geometry: Geometry, track: Track | None, timings: dict
         why = "the joint track has grown out of all proportion to the path"
     if query.late:
         status, why = PlanningStatus.OUT_OF_TIME, "time was over"
-    # The link would have to go on from where its start comes next: over the track already drawn.
+    # Its start comes next over the track already drawn: there the link has to turn as the path does.
     drawn = slice(max(int(track.start[track.n - 1]), 0), track.n)
-    deepest = deepest_link(
-        geometry.maze, track.aim, track.points[drawn], track.indices[drawn], float(query.arm.link_length)
-    )
+    along = np.unwrap(np.arctan2(path.tangents[:, 1], path.tangents[:, 0]))
+    beyond = min(int(np.searchsorted(path.s, path.s[track.index] + length)), len(along) - 1)
+    heading = float(track.headings[track.n - 1])
+    heading += 2.0 * math.pi * round((along[track.indices[drawn.start]] - heading) / (2.0 * math.pi))
+    deepest = least_depth(geometry.maze, track.points[drawn], heading, float(along[beyond]) - heading, length)
     what = ""
     if deepest is not None:
         depth, (x_wall, y_wall) = deepest
         what = (
-            f" On its way on, its link would get {depth:.3g} {query.maze.units} deep into the wall at "
-            f"({x_wall:.1f}, {y_wall:.1f})."
+            f" To turn as the path does, its link would get at least {depth:.3g} {query.maze.units} deep into "
+            f"the wall at ({x_wall:.1f}, {y_wall:.1f})."
         )
     return Candidate(
         status=status,
