@@ -10,8 +10,8 @@ from planners.kernels.types import FloatArray
 
 __all__ = ["least_depth", "wall_nearest_to"]
 
-STARTS, HEADINGS, SAMPLES = 32, 16, 48
-"""Starts and headings of a link, and points on it, that are looked at: enough to name a wall and to draw it."""
+STARTS, HEADINGS, SAMPLES = 48, 16, 48
+"""Starts and headings of a link, and points on it, that are looked at: enough to name a wall."""
 
 
 def wall_nearest_to(maze: Maze, place: tuple[float, float]) -> int:

@@ -486,7 +486,7 @@ def _failed(query: Query, geometry: Geometry, track: Track | None, timings: dict
         why = "the joint track has grown out of all proportion to the path"
     if query.late:
         status, why = PlanningStatus.OUT_OF_TIME, "time was over"
-    # Its start comes next over the track already drawn: there the link has to turn as the path does.
+    # Its start comes over the track already drawn and, if all goes well, the aim: there the link has to turn.
     drawn = slice(max(int(track.start[track.n - 1]), 0), track.n)
     along = np.unwrap(np.arctan2(path.tangents[:, 1], path.tangents[:, 0]))
     beyond = min(int(np.searchsorted(path.s, path.s[track.index] + length)), len(along) - 1)
@@ -497,8 +497,8 @@ def _failed(query: Query, geometry: Geometry, track: Track | None, timings: dict
     if deepest is not None:
         depth, (x_wall, y_wall) = deepest
         what = (
-            f" To turn as the path does, its link would get at least {depth:.3g} {query.maze.units} deep into "
-            f"the wall at ({x_wall:.1f}, {y_wall:.1f})."
+            f" To turn as the path does, its link would get at least {depth:.3g} {query.maze.units} deep "
+            f"into the wall at ({x_wall:.1f}, {y_wall:.1f})."
         )
     return Candidate(
         status=status,
