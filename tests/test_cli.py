@@ -12,8 +12,11 @@ import pytest
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import fig19
-from planners import Motion, plan
+from planners import Motion, PlanningResult, PlanningStatus, plan
 from planners.cli import main
+from planners.drawing import draw_failure
+from planners.problem import Failure
+from planners.tables import show_plan
 
 
 @pytest.fixture(autouse=True)
@@ -92,9 +95,28 @@ def test_a_failed_plan_says_and_draws_what_is_in_the_way(run):
     code, out, _ = run("plan", "S200", "--link-length", 500, "--planner", "sweep", "--picture", "why.png")
     words = " ".join(out.split())
     assert code == 3 and "Written: why.png" in out
-    assert "tried sweep: dead end" in words and "px from the base" in words and "in the way wall" in words
-    assert "px in that wall" in words and "longest link there" in words
+    assert "tried sweep: dead end" in words and "px from the base" in words and "longest link there" in words
     assert Path("why.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_wall_that_is_in_the_way_is_named_and_drawn(capsys):
+    maze, arm = Maze.load("L"), ArmSpec(link_length=600.0)
+    joints = np.array([[0.0, 100.0], [0.0, 700.0], [-90.0, 1290.0]])
+    failure = Failure(
+        place=(-90.0, 1290.0), path_position=1200.0, link=0, wall=2, depth=12.5, joints=joints
+    )  # fmt: skip
+    result = PlanningResult(
+        status=PlanningStatus.DEAD_END, planner="sweep", failure=failure, longest_there=561.0
+    )
+    show_plan(maze, arm, result, None, Path("why.png"))
+    words = " ".join(capsys.readouterr().out.split())
+    (x0, y0), (x1, y1) = maze.walls[2]
+    assert f"in the way wall 2 from ({x0:.5g}, {y0:.5g}) to ({x1:.5g}, {y1:.5g})" in words
+    assert "depth 12.5 px in that wall" in words and "longest link there 561 px" in words
+    draw_failure(maze, arm, result, Path("why.png"))
+    bare = PlanningResult(status=PlanningStatus.NO_PATH, planner="sweep", reason="No path.")
+    draw_failure(maze, arm, bare, Path("bare.svg"))
+    assert all(Path(name).stat().st_size > 5000 for name in ("why.png", "bare.svg"))
 
 
 def test_a_plan_is_drawn_and_a_motion_can_be_started_from(run, motion):
