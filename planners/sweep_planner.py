@@ -492,7 +492,9 @@ def _failed(query: Query, geometry: Geometry, track: Track | None, timings: dict
     beyond = min(int(np.searchsorted(path.s, path.s[track.index] + length)), len(along) - 1)
     heading = float(track.headings[track.n - 1])
     heading += 2.0 * math.pi * round((along[track.indices[drawn.start]] - heading) / (2.0 * math.pi))
-    deepest = least_depth(geometry.maze, track.points[drawn], heading, float(along[beyond]) - heading, length)
+    every = max(1, (drawn.stop - drawn.start) // max(beyond - track.index, 1))
+    starts = np.concatenate([track.points[drawn][::every], track.aim[track.index : beyond]])
+    deepest = least_depth(geometry.maze, starts, heading, float(along[beyond]) - heading, length)
     what = ""
     if deepest is not None:
         depth, (x_wall, y_wall) = deepest
