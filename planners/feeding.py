@@ -19,8 +19,8 @@ STEP = 0.03
 POSES_PER_LINK = 120
 """Room for poses per link length of track, at first."""
 
-MAX_POSES = 400_000
-"""Largest number of poses."""
+MOST_POSES_PER_LINK = 2000
+"""Largest number of poses per link length of track; a joint that needs more is about to jump."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -58,13 +58,13 @@ def feed(track: FloatArray, link_length: float, base_pose: FloatArray, step: flo
     """
     track, arc = _subdivided(track, link_length)
     n_links = math.floor(arc[-1] / link_length) + 2
-    room = math.ceil(POSES_PER_LINK * n_links)
+    room = POSES_PER_LINK * n_links
     while True:
         poses = np.empty((room, n_links + 1, 2))
         n, ending, x, y = kernel.feed_along(track, arc, link_length, base_pose, step * link_length, poses)
-        if ending != kernel.FULL or room >= MAX_POSES:
+        if ending != kernel.FULL or room >= MOST_POSES_PER_LINK * n_links:
             break
-        room = min(4 * room, MAX_POSES)
+        room = min(4 * room, MOST_POSES_PER_LINK * n_links)
     poses = poses[:n]
     cos, sin = math.cos(base_pose[2]), math.sin(base_pose[2])
     # Links that never leave the feeder are not needed.

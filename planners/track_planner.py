@@ -24,7 +24,7 @@ from planners.kernels import feeding as feeding_kernel
 from planners.kernels import track as kernel
 from planners.kernels.track_solve import find_normals, project_rows, solve_rows
 from planners.kernels.track_types import ROW_WIDTH, Chords, Rows
-from planners.kernels.track_walls import apply_move, edge_rows, sample_rows
+from planners.kernels.track_walls import apply_move, edge_rows, edges_are_free, sample_rows
 from planners.kernels.types import FloatArray
 from planners.obstruction import wall_nearest_to
 from planners.problem import Candidate, Failure, Motion, PlanningStatus
@@ -34,8 +34,8 @@ from planners.track_start import start_from_motion, start_from_path, with_axis
 
 __all__ = ["plan_track"]
 
-COARSE = 12
-"""Samples per link length while the chords grow."""
+COARSE = (12, 24, 48)
+"""Samples per link length while the chords grow: the first that keep the track from cutting corners."""
 
 FINE = ((24, 1.0), (48, 1.0), (48, 4.0), (96, 4.0), (96, 16.0))
 """Samples per link length, and margins in units of the usual one, tried until the exact poses are free."""
@@ -66,6 +66,9 @@ JUMP = 0.25
 
 PATIENCE = 12
 """Steps after growing, until less growth is tried."""
+
+SETTLING = 4
+"""Steps on the coarse track, at least: they take the kinks out of the line it begins with."""
 
 MOST_GROWING, MOST_STEPS = 400, 40
 """Steps on the coarse track, and on each of the finer ones."""
@@ -232,8 +235,20 @@ def _from_motion(query: Query, motion: Motion) -> tuple[_Track | None, Scene | N
     line = start_from_motion(scene, motion)
     if line is None:
         return None, None
-    track = _measured(with_axis(line, COARSE), COARSE, 1.0, scene, COARSE_WEIGHTS)
-    return _finished(track, scene, query), scene
+    points, per_link = _coarse(line, scene)
+    track = _finished(_measured(points, per_link, 1.0, scene, COARSE_WEIGHTS), scene, query)
+    if track.poses is None:
+        track = _finished(_grown(line, scene, query), scene, query)
+    return track, scene
+
+
+def _coarse(line: FloatArray, scene: Scene) -> tuple[FloatArray, int]:
+    """Sample a free line, with the axis in front of it, so that it stays free; return samples per link too."""
+    for per_link in COARSE:
+        points = with_axis(line, per_link)
+        if edges_are_free(points, per_link, scene.near):
+            break
+    return points, per_link
 
 
 def _measured(points: FloatArray, per_link: int, chord: float, scene: Scene, weights: _Weights) -> _Track:
@@ -312,14 +327,14 @@ def _grown(line: FloatArray, scene: Scene, query: Query) -> _Track:
         With chords of the length that was reached.
     """
     weights, growth, since = COARSE_WEIGHTS, GROWTH, 0
-    points = with_axis(line, COARSE)
+    points, per_link = _coarse(line, scene)
     for chord in SHORT_CHORDS:
-        track = _measured(points, COARSE, chord, scene, weights)
+        track = _measured(points, per_link, chord, scene, weights)
         if track.fits:
             break
     best: _Track | None = None
-    for _ in range(MOST_GROWING):
-        if (track.easy and track.chord == 1.0) or query.late:
+    for number in range(MOST_GROWING):
+        if (number >= SETTLING and track.easy and track.chord == 1.0) or query.late:
             break
         weights = replace(weights, smooth=max(SMOOTH_DECAY * weights.smooth, LEAST_SMOOTH))
         if track.easy:
@@ -348,6 +363,8 @@ def _finished(track: _Track, scene: Scene, query: Query) -> _Track:
     if track.chord < 1.0 or track.slips:
         return track
     for number, (per_link, margin) in enumerate(FINE):
+        if per_link < track.per_link:
+            continue
         query.tell("plan", 0.5 + 0.5 * number / len(FINE))
         points = with_axis(track.points[track.per_link :], per_link)
         weights = replace(FINE_WEIGHTS, margin=margin)
@@ -372,7 +389,7 @@ def _free_poses(track: _Track, scene: Scene) -> FloatArray | None:
         return None
     if feeding_kernel.first_hit(fed.poses, scene.maze.base_pose, scene.maze.walls)[0] >= 0:
         return None
-    return None if feeding_kernel.first_self_crossing(fed.poses)[0] >= 0 else fed.poses
+    return None if feeding_kernel.first_self_crossing(fed.poses, scene.maze.base_pose)[0] >= 0 else fed.poses
 
 
 def _solved(poses: FloatArray, scene: Scene, clock: list[float], timings: Mapping[str, float]) -> Candidate:

@@ -25,7 +25,7 @@ CANDIDATES = 60
 COST_OF_LENGTH = 0.1
 """What skipping a link length of line costs, against turning by a rad."""
 
-OFFSET = 0.01
+OFFSET = 0.02
 """How far from a wall a line is led round it, in link lengths."""
 
 LONGEST_SKIP = 3.0

@@ -205,21 +205,28 @@ def _cross(ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx:
 
 
 @njit(cache=True)
+def _in_feeder(ax: float, ay: float, bx: float, by: float, base_pose: FloatArray) -> bool:
+    """Tell whether a link from a to b still lies on the feeder's axis, with its start behind the base."""
+    cos, sin = np.cos(base_pose[2]), np.sin(base_pose[2])
+    size = abs(bx - ax) + abs(by - ay)
+    along = (ax - base_pose[0]) * cos + (ay - base_pose[1]) * sin
+    start = abs((ay - base_pose[1]) * cos - (ax - base_pose[0]) * sin)
+    end = abs((by - base_pose[1]) * cos - (bx - base_pose[0]) * sin)
+    return along < 0.0 and start <= 1e-9 * size and end <= 1e-9 * size
+
+
+@njit(cache=True)
 def first_hit(poses: FloatArray, base_pose: FloatArray, walls: FloatArray) -> tuple[int, int, int]:
     """Find the first pose in which a link in front of the base meets a wall: pose, link, wall; -1 if none.
 
     Exact up to rounding: centre lines against wall segments, touching counted. A link that comes out of the
     feeder is looked at from the base on.
     """
-    cos, sin = np.cos(base_pose[2]), np.sin(base_pose[2])
     for pose in range(poses.shape[0]):
         for link in range(poses.shape[1] - 2, -1, -1):
             ax, ay = poses[pose, link, 0], poses[pose, link, 1]
             bx, by = poses[pose, link + 1, 0], poses[pose, link + 1, 1]
-            behind = (ax - base_pose[0]) * cos + (ay - base_pose[1]) * sin < 0.0
-            behind &= abs((ay - base_pose[1]) * cos - (ax - base_pose[0]) * sin) <= 1e-9 * abs(
-                bx - ax + by - ay
-            )
+            behind = _in_feeder(ax, ay, bx, by, base_pose)
             if behind:
                 ax, ay = base_pose[0], base_pose[1]
             low_x, high_x, low_y, high_y = min(ax, bx), max(ax, bx), min(ay, by), max(ay, by)
@@ -241,11 +248,17 @@ def first_hit(poses: FloatArray, base_pose: FloatArray, walls: FloatArray) -> tu
 
 
 @njit(cache=True)
-def first_self_crossing(poses: FloatArray) -> tuple[int, int, int]:
-    """Find the first pose in which two links that are not neighbours cross: pose and links; -1 if none."""
+def first_self_crossing(poses: FloatArray, base_pose: FloatArray) -> tuple[int, int, int]:
+    """Find the first pose in which two links that are not neighbours cross: pose and links; -1 if none.
+
+    What is in the feeder is not looked at.
+    """
     for pose in range(poses.shape[0]):
         for i in range(poses.shape[1] - 3, -1, -1):
             ax, ay = poses[pose, i, 0], poses[pose, i, 1]
+            behind = _in_feeder(ax, ay, poses[pose, i + 1, 0], poses[pose, i + 1, 1], base_pose)
+            if behind:
+                ax, ay = base_pose[0], base_pose[1]
             bx, by = poses[pose, i + 1, 0], poses[pose, i + 1, 1]
             low_x, high_x, low_y, high_y = min(ax, bx), max(ax, bx), min(ay, by), max(ay, by)
             for k in range(i + 2, poses.shape[1] - 1):
@@ -255,4 +268,6 @@ def first_self_crossing(poses: FloatArray) -> tuple[int, int, int]:
                     continue
                 if _cross(ax, ay, bx, by, cx, cy, dx, dy):
                     return pose, i, k
+            if behind:
+                break
     return -1, -1, -1

@@ -96,6 +96,15 @@ def _meets_near(ax: float, ay: float, bx: float, by: float, near: Surroundings) 
 
 
 @njit(cache=True)
+def edges_are_free(points: FloatArray, first: int, near: Surroundings) -> bool:
+    """Tell whether no wall meets the track, shape (n, 2), from a sample on; edges are within the reach."""
+    for i in range(first, points.shape[0] - 1):
+        if _meets_near(points[i, 0], points[i, 1], points[i + 1, 0], points[i + 1, 1], near):
+            return False
+    return True
+
+
+@njit(cache=True)
 def _from_wall(x: float, y: float, wall: FloatArray) -> tuple[float, float]:
     """Return the vector from the nearest point of a wall, shape (2, 2), to (x, y)."""
     ex, ey = wall[1, 0] - wall[0, 0], wall[1, 1] - wall[0, 1]
