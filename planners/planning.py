@@ -40,11 +40,12 @@ PLANNERS: dict[str, Callable[[Query], Candidate]] = {
 }
 """All planners by name."""
 
-FIRST = ("sweep", "track", "beam")
-"""The planners that `auto` tries first, in this order, until one has a motion that passes the checker."""
+FIRST = (("track", False), ("sweep", False), ("beam", False), ("sweep", True))
+"""What `auto` asks first, in this order, until a motion passes the checker: planners, and how thoroughly. The
+track comes first as its motions take the fewest links and poses, and its failures hardly any time."""
 
-THEN = ("sweep", "track")
-"""The planners that `auto` tries on each further way round the obstacles."""
+THEN = (("track", False), ("sweep", False))
+"""What `auto` asks on each further way round the obstacles."""
 
 MAX_ROUTES = 12
 """Ways round the obstacles that `auto` tries, the first one included."""
@@ -72,8 +73,8 @@ def plan(
     arm : ArmSpec
         The arm. With `n_links` None it gets as many links as the motion needs.
     planner : str
-        `auto` or a key of `PLANNERS`. `auto` tries the sweep, then the others, then other ways round the
-        obstacles.
+        `auto` or a key of `PLANNERS`. `auto` tries the track, then the sweep and the others, then other ways
+        round the obstacles.
     time_budget : float
         In s. What is found by then is returned; the outcome depends on it only if it runs out.
     warm_start : Motion, optional
@@ -138,17 +139,18 @@ def _questions(
     query: Query, planner: str, warm_start: Motion | None, checker: _Checker
 ) -> Iterator[tuple[str, int, Query]]:
     """Yield which planner to ask, on which way round the obstacles (0: the potential's), and the query."""
-    if warm_start is not None and "track" in PLANNERS:
+    if warm_start is not None:
         name = "track" if planner == "auto" else planner
         yield name, 0, dataclasses.replace(query, warm_start=warm_start)
     if planner != "auto":
         if warm_start is None:
             yield planner, 0, query
         return
-    for name in (name for name in FIRST if name in PLANNERS):
-        # What the sweep drew and the checker refused is a good start for shaping the whole track.
-        hint = checker.refused if name == "track" else None
-        yield name, 0, query if hint is None else dataclasses.replace(query, warm_start=hint)
+    for name, thorough in FIRST:
+        yield name, 0, dataclasses.replace(query, thorough=thorough)
+        if name == "sweep" and checker.refused is not None:
+            # What the sweep drew and the checker refused is a good start for shaping the whole track.
+            yield "track", 0, dataclasses.replace(query, warm_start=checker.refused)
     if query.geometry is None:
         return
     known = {signature(query.geometry.maze, query.geometry.path.points)}
@@ -158,8 +160,8 @@ def _questions(
         if way.signature not in known:
             known.add(way.signature)
             number += 1
-            for name in (name for name in THEN if name in PLANNERS):
-                yield name, number, dataclasses.replace(query, route=way.points)
+            for name, thorough in THEN:
+                yield name, number, dataclasses.replace(query, route=way.points, thorough=thorough)
 
 
 class _Late(Exception):

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.maze import Maze
@@ -34,10 +33,15 @@ class Query:
     route : array, shape (n, 2), or None
         Waypoints from the base to the goal through the free space: which way round the obstacles. By default
         the way of the Laplace potential.
+    thorough : bool
+        Whether to try everything; otherwise what takes more than some tenths of a second is left.
     checker : callable or None
         Says of a motion whether it is valid, as `planners.validation.validate` does.
     progress : callable or None
         Told about stage and share done.
+    surveys : dict
+        What has been looked at by this query and those made from it by `dataclasses.replace`, for the same
+        maze and link radius, by the identity of the route.
     """
 
     maze: Maze
@@ -45,13 +49,18 @@ class Query:
     deadline: float = math.inf
     warm_start: Motion | None = None
     route: FloatArray | None = None
+    thorough: bool = True
     checker: Callable[[Motion], ValidationReport] | None = None
     progress: Progress | None = None
+    surveys: dict[int, Geometry | None] = field(default_factory=dict, repr=False)
 
-    @cached_property
+    @property
     def geometry(self) -> Geometry | None:
         """Path, beams and corners of the route; None if nothing leads to the goal. Computed once."""
-        return survey(self.maze, self.arm.link_radius, self.route)
+        key = id(self.route)
+        if key not in self.surveys:
+            self.surveys[key] = survey(self.maze, self.arm.link_radius, self.route)
+        return self.surveys[key]
 
     def check(self, motion: Motion) -> ValidationReport | None:
         """Ask the checker about a motion; None if there is none to ask."""

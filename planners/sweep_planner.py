@@ -64,6 +64,9 @@ FINENESSES = (
 )
 """Tried in this order: the finer ones gain the last percent of length."""
 
+QUICK = 2
+"""As many of them are tried if the query is not to be answered thoroughly."""
+
 STRICT_OVERLAP, STRICT_STEP, STRICT_DEVIATION = 0.5, 0.02, 3e-4
 """Of a fineness, once the checker has refused a motion of a coarser one for what is between its poses: so
 sharp corners of walls are passed without a hop."""
@@ -241,7 +244,7 @@ class _Search:
     def run(self) -> Motion | None:
         """Return a motion that the checker accepts; otherwise the last one that it refused, or None."""
         chosen, strict = self._least_swings(), False
-        for number, fineness in enumerate(FINENESSES):
+        for number, fineness in enumerate(FINENESSES if self.query.thorough else FINENESSES[:QUICK]):
             if strict:
                 fineness = fineness._replace(
                     overlap=STRICT_OVERLAP, step=STRICT_STEP, deviation=STRICT_DEVIATION
