@@ -172,7 +172,9 @@ class _Checker:
     """The exact checker for one query; remembers what it said last."""
 
     def __init__(self, maze: Maze, arm: ArmSpec, deadline: float, progress: Progress | None) -> None:
-        self.maze, self.arm, self.deadline, self.progress = maze, arm, deadline, progress
+        # Planners give as many links as the motion needs.
+        self.maze, self.arm = maze, dataclasses.replace(arm, n_links=None)
+        self.deadline, self.progress = deadline, progress
         self.last: tuple[Motion, ValidationReport] | None = None
         self.refused: Motion | None = None
         self.seconds = 0.0

@@ -104,7 +104,7 @@ def test_too_few_links_are_refused_with_the_number_it_takes(planner):
 
 def test_a_planner_that_needs_fewer_links_is_found(monkeypatch):
     maze = Maze.load("fig17a")
-    with pytest.raises(InputError, match="at least 4[89] links"):
+    with pytest.raises(InputError, match=r"at least 4[89] links"):
         plan(maze, ArmSpec(link_length=245.0, n_links=45), planner="sweep")
     monkeypatch.setattr(planning, "FIRST", (("sweep", False), ("track", False)))
     assert plan(maze, ArmSpec(link_length=245.0, n_links=45)).planner == "track"
