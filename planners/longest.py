@@ -44,6 +44,9 @@ BOUND_BUDGET = 60.0
 FRACTIONS = (0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 """The ladder of lengths in the table, as shares of the bound, before they are rounded to three digits."""
 
+STRIDES = (32, 16, 8, 4, 2, 1)
+"""Which steps of the grid above the best are tried first: every 32nd, and so on."""
+
 SHORTEST = 0.1
 """The last step of the grid, as a share of the bound."""
 
@@ -292,7 +295,7 @@ class _Search:
 
         First the rungs of the ladder, the middle one before the others, until one passes. Then between the
         best and the nearest longer length that failed, halving; then the other rungs; then every step that is
-        left above the best, from below.
+        left above the best, first few and far between, then ever closer.
         """
         trials, best = self.file.trials, self.file.best
         rungs = sorted(self.rungs, key=lambda length: abs(length - 0.5 * self.bound.upper))
@@ -304,8 +307,11 @@ class _Search:
         last = max((k for k, length in enumerate(above) if length in trials), default=-1)
         if last + 1 < len(above):
             return above[(last + 1 + len(above)) // 2]
-        left = [length for length in above if length not in trials]
-        return rungs[0] if rungs else left[-1] if left else None
+        if rungs:
+            return rungs[0]
+        strides = (above[::stride] for stride in STRIDES)
+        left = (length for steps in strides for length in steps[::-1] if length not in trials)
+        return next(left, None)
 
     def _try(self, length: float) -> None:
         ask, start = self.question, time.perf_counter()

@@ -39,7 +39,7 @@ def asked(monkeypatch):
 
 @pytest.fixture(scope="module")
 def answer():
-    return longest_link(bend(), accuracy=0.01, lengths=(200.0, 900.0))
+    return longest_link(bend(), "sweep", accuracy=0.01, lengths=(200.0, 900.0))
 
 
 def test_the_longest_link_is_within_the_bound_and_near_the_closed_form(answer):
@@ -75,7 +75,7 @@ def test_the_table_has_the_ladder_the_lengths_asked_for_and_the_longest(answer):
 
 
 def test_a_length_beyond_the_bound_is_never_planned(asked):
-    answer = longest_link(bend(), accuracy=0.2, lengths=(900.0,))
+    answer = longest_link(bend(), "sweep", accuracy=0.2, lengths=(900.0,))
     assert max(asked) <= answer.bound.upper
     (beyond,) = [trial for trial in answer.table if trial.link_length == 900.0]
     assert beyond.status is PlanningStatus.NO_PATH and beyond.reason.startswith("No rod longer than")
@@ -99,18 +99,18 @@ def test_an_interrupted_search_gives_the_best_so_far_and_goes_on_where_it_was(tm
         return counted(*arguments, **settings)
 
     monkeypatch.setattr(longest, "plan", interrupted)
-    first = longest_link(bend(), accuracy=0.02, state=state)
+    first = longest_link(bend(), "sweep", accuracy=0.02, state=state)
     assert not first.complete and first.untried and len(first.trials) == 4
     assert first.motion.link_length == first.length > 0.0
     done = list(asked)
     monkeypatch.setattr(longest, "plan", counted)
     monkeypatch.setattr(longest, "rod_bound", None)  # it is in the state
-    second = longest_link(bend("another name"), accuracy=0.02, state=state)
+    second = longest_link(bend("another name"), "sweep", accuracy=0.02, state=state)
     assert second.complete and second.length >= first.length and second.note == ""
     assert not set(done) & set(asked[4:]) and len(set(asked)) == len(asked)
     assert second.bound.path.length == second.bound.lower
     asked.clear()
-    third = longest_link(bend(), accuracy=0.02, state=state)
+    third = longest_link(bend(), "sweep", accuracy=0.02, state=state)
     assert asked == [] and third.to_dict() == second.to_dict()
     assert np.array_equal(third.motion.joints, second.motion.joints)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["state.best.npz", "state.json"]
@@ -118,25 +118,25 @@ def test_an_interrupted_search_gives_the_best_so_far_and_goes_on_where_it_was(tm
 
 def test_a_state_of_another_maze_or_of_other_options_is_not_used(tmp_path, asked):
     state = tmp_path / "state.json"
-    longest_link(bend(), accuracy=0.2, state=state)
+    longest_link(bend(), "sweep", accuracy=0.2, state=state)
     n_first = len(asked)
     narrower = Maze.from_corridors([(0, 0), (0, 1500), (1500, 1500)], 190.0)
-    answer = longest_link(narrower, accuracy=0.2, state=state)
+    answer = longest_link(narrower, "sweep", accuracy=0.2, state=state)
     assert "starts anew" in answer.note and len(asked) > n_first
     assert answer.length < answer.bound.upper < 0.99 * LIMIT
-    assert "starts anew" in longest_link(narrower, accuracy=0.2, joint_limit=2.0, state=state).note
+    assert "starts anew" in longest_link(narrower, "sweep", accuracy=0.2, joint_limit=2.0, state=state).note
 
 
 def test_a_state_without_its_motion_or_with_one_that_is_not_valid_asks_again(tmp_path, asked):
     state = tmp_path / "state.json"
-    first = longest_link(bend(), accuracy=0.2, state=state)
+    first = longest_link(bend(), "sweep", accuracy=0.2, state=state)
     (tmp_path / "state.best.npz").unlink()
     asked.clear()
-    assert longest_link(bend(), accuracy=0.2, state=state).length == first.length in asked
+    assert longest_link(bend(), "sweep", accuracy=0.2, state=state).length == first.length in asked
     moved = dataclasses.replace(first.motion, joints=np.add(first.motion.joints, [50.0, 0.0]))
     moved.save(tmp_path / "state.best.npz")
     asked.clear()
-    again = longest_link(bend(), accuracy=0.2, state=state)
+    again = longest_link(bend(), "sweep", accuracy=0.2, state=state)
     assert again.length == first.length in asked and not np.array_equal(again.motion.joints, moved.joints)
 
 
@@ -153,16 +153,16 @@ def test_a_length_that_lacked_time_is_said_and_asked_again_with_more_time_only(t
     monkeypatch.setattr(longest, "plan", late)
     monkeypatch.setattr(longest, "_compile", lambda planner: None)
     options = {"accuracy": 0.05, "state": tmp_path / "state.json"}
-    first = longest_link(bend(), time_budget=5.0, **options)
+    first = longest_link(bend(), "sweep", time_budget=5.0, **options)
     assert first.length < 400.0 and len(first.out_of_time) >= 5 and first.failed == ()
     calls.clear()
-    assert longest_link(bend(), time_budget=5.0, **options).length == first.length and calls == []
-    longest_link(bend(), time_budget=6.0, **options)
+    assert longest_link(bend(), "sweep", time_budget=5.0, **options).length == first.length and calls == []
+    longest_link(bend(), "sweep", time_budget=6.0, **options)
     assert set(calls) == {trial.link_length for trial in first.out_of_time}
 
 
 def test_where_nothing_passes_the_answer_is_zero_with_all_reasons(tmp_path):
-    answer = longest_link(bend(), "sweep", accuracy=0.1, joint_limit=0.01)
+    answer = longest_link(bend(), "sweep", accuracy=0.4, joint_limit=0.01)
     assert (answer.length, answer.index, answer.motion) == (0.0, 0.0, None)
     assert answer.complete and all(trial.reason for trial in answer.failed) and answer.bound.upper > LIMIT
     draw_longest(bend(), answer, tmp_path / "chart.png")
@@ -170,13 +170,13 @@ def test_where_nothing_passes_the_answer_is_zero_with_all_reasons(tmp_path):
 
 
 def test_links_too_thick_for_the_maze_have_no_longest_length():
-    answer = longest_link(bend(), accuracy=0.1, link_radius=150.0, lengths=(400.0,))
+    answer = longest_link(bend(), "sweep", accuracy=0.1, link_radius=150.0, lengths=(400.0,))
     assert (answer.length, answer.bound.upper, answer.untried) == (0.0, 0.0, ())
     assert [trial.link_length for trial in answer.table] == [400.0]
 
 
 def test_thick_links_are_shorter_than_thin_ones():
-    thick = longest_link(bend(), accuracy=0.05, link_radius=15.0)
+    thick = longest_link(bend(), "sweep", accuracy=0.05, link_radius=15.0)
     # The corridor is 30 narrower, but its inner corner is round: between the square corner's limit and more.
     assert 0.95**2 * 0.85 * LIMIT < thick.length < 0.95 * LIMIT
 
@@ -210,10 +210,10 @@ def test_a_file_of_something_else_is_neither_used_nor_overwritten(tmp_path):
         (None, "got a damaged one"),
     ):
         if text is None:
-            longest_link(bend(), accuracy=0.4, state=path)
+            longest_link(bend(), "sweep", accuracy=0.4, state=path)
             text = json.dumps({**json.loads(path.read_text()), "trials": [{"link_length": "long"}]})
         path.write_text(text)
         if sentence is not None:
             with pytest.raises(InputError, match=sentence):
-                longest_link(bend(), accuracy=0.4, state=path)
+                longest_link(bend(), "sweep", accuracy=0.4, state=path)
             assert path.read_text() == text
