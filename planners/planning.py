@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 import time
 from collections.abc import Callable, Iterator
@@ -15,6 +14,7 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners.beam_planner import plan_beam
 from planners.obstruction import wall_nearest_to
+from planners.portfolio import Question, first_questions, further_questions
 from planners.problem import (
     Attempt,
     Candidate,
@@ -26,7 +26,7 @@ from planners.problem import (
     ValidationReport,
 )
 from planners.query import Query
-from planners.routes import routes, signature
+from planners.rod_bound import Passage, rod_passes
 from planners.sweep_planner import longest_past, plan_sweep
 from planners.track_planner import plan_track
 from planners.validation import validate
@@ -40,15 +40,8 @@ PLANNERS: dict[str, Callable[[Query], Candidate]] = {
 }
 """All planners by name."""
 
-FIRST = (("track", False), ("sweep", False), ("beam", False), ("sweep", True))
-"""What `auto` asks first, in this order, until a motion passes the checker: planners, and how thoroughly. The
-track comes first as its motions take the fewest links and poses, and its failures hardly any time."""
-
-THEN = (("track", False), ("sweep", False))
-"""What `auto` asks on each further way round the obstacles."""
-
-MAX_ROUTES = 12
-"""Ways round the obstacles that `auto` tries, the first one included."""
+ROD = 1e-3
+"""How finely, in link lengths, it is decided whether a rod passes."""
 
 TIME_BUDGET = 60.0
 """Seconds that planning may take by default."""
@@ -100,7 +93,7 @@ def plan(
     --------
     >>> result = plan(Maze.load("fig19"), ArmSpec(link_length=430.0))
     >>> result.status, result.motion.n_links
-    (<PlanningStatus.SOLVED: 'solved'>, 7)
+    (<PlanningStatus.SOLVED: 'solved'>, 6)
     """
     if planner != "auto" and planner not in PLANNERS:
         raise InputError(f"Unknown planner {planner!r}. Available: auto, {', '.join(PLANNERS)}.")
@@ -111,57 +104,67 @@ def plan(
         _check_warm_start(warm_start, maze, arm)
     deadline = time.perf_counter() + time_budget
     checker = _Checker(maze, arm, deadline, progress)
-    query = Query(maze=maze, arm=arm, deadline=deadline, checker=checker, progress=progress)
-    failures: list[PlanningResult] = []
-    shortage: InputError | None = None
-    attempts: list[Attempt] = []
-    for name, route, asked in _questions(query, planner, warm_start, checker):
-        start = time.perf_counter()
-        try:
-            result = _answer(name, asked, checker)
-        except InputError as error:  # another planner may need fewer links
-            shortage = shortage or error
-            continue
-        seconds = time.perf_counter() - start
-        attempts.append(Attempt(planner=name, route=route, status=result.status, seconds=seconds))
-        if result.solved:
-            return dataclasses.replace(result, attempts=tuple(attempts))
-        failures.append(result)
-        if query.late or (route and shortage):
-            break
-    if shortage is not None:
-        raise shortage
-    first = dataclasses.replace(failures[0], attempts=tuple(attempts))
-    return _explained(first, query) if explain else first
-
-
-def _questions(
-    query: Query, planner: str, warm_start: Motion | None, checker: _Checker
-) -> Iterator[tuple[str, int, Query]]:
-    """Yield which planner to ask, on which way round the obstacles (0: the potential's), and the query."""
-    if warm_start is not None:
-        name = "track" if planner == "auto" else planner
-        yield name, 0, dataclasses.replace(query, warm_start=warm_start)
+    query = Query(
+        maze=maze, arm=arm, deadline=deadline, checker=checker, refused=checker.refused, progress=progress
+    )
+    hearing = _Hearing(checker)
     if planner != "auto":
-        if warm_start is None:
-            yield planner, 0, query
-        return
-    for name, thorough in FIRST:
-        yield name, 0, dataclasses.replace(query, thorough=thorough)
-        if name == "sweep" and checker.refused is not None:
-            # What the sweep drew and the checker refused is a good start for shaping the whole track.
-            yield "track", 0, dataclasses.replace(query, warm_start=checker.refused)
-    if query.geometry is None:
-        return
-    known = {signature(query.geometry.maze, query.geometry.path.points)}
-    ways = routes(query.maze, query.arm.link_length, link_radius=query.arm.link_radius)
-    number = 0
-    for way in itertools.islice(ways, MAX_ROUTES):
-        if way.signature not in known:
-            known.add(way.signature)
-            number += 1
-            for name, thorough in THEN:
-                yield name, number, dataclasses.replace(query, route=way.points, thorough=thorough)
+        own = Question(planner, 0, dataclasses.replace(query, warm_start=warm_start))
+        result = hearing.first_solved(iter([own]))
+    else:
+        result = hearing.first_solved(first_questions(query, warm_start))
+        if result is None and hearing.shortage is None and not query.late and query.geometry is not None:
+            rod = rod_passes(maze, arm.link_length, arm.link_radius, resolution=ROD, deadline=deadline)
+            if rod.passes is Passage.NO:
+                hearing.impossible(f"No rod of {arm.link_length:g} {maze.units} passes: this is proved.")
+            else:
+                result = hearing.first_solved(further_questions(query, rod.path))
+    if result is not None:
+        return result
+    if hearing.shortage is not None:
+        raise hearing.shortage
+    return _explained(hearing.failure(), query) if explain else hearing.failure()
+
+
+class _Hearing:
+    """Ask planners one after the other, and keep the record."""
+
+    def __init__(self, checker: _Checker) -> None:
+        self.checker = checker
+        self.attempts: list[Attempt] = []
+        self.failures: list[PlanningResult] = []
+        self.shortage: InputError | None = None
+
+    def first_solved(self, questions: Iterator[Question]) -> PlanningResult | None:
+        """Return the first valid answer."""
+        for question in questions:
+            start = time.perf_counter()
+            try:
+                result = _answer(question, self.checker)
+            except InputError as error:  # another planner may need fewer links
+                self.shortage = self.shortage or error
+                continue
+            seconds = time.perf_counter() - start
+            self.attempts.append(
+                Attempt(planner=question.planner, route=question.route, status=result.status, seconds=seconds)
+            )
+            if result.solved:
+                return dataclasses.replace(result, attempts=tuple(self.attempts))
+            self.failures.append(result)
+            if question.query.late:
+                break
+        return None
+
+    def impossible(self, proof: str) -> None:
+        """Note that no planner can have a motion."""
+        first = self.failures[0]
+        self.failures[0] = dataclasses.replace(
+            first, status=PlanningStatus.IMPOSSIBLE, reason=f"{proof} {first.reason}"
+        )
+
+    def failure(self) -> PlanningResult:
+        """Return the first failure, with the record."""
+        return dataclasses.replace(self.failures[0], attempts=tuple(self.attempts))
 
 
 class _Late(Exception):
@@ -176,7 +179,7 @@ class _Checker:
         self.maze, self.arm = maze, dataclasses.replace(arm, n_links=None)
         self.deadline, self.progress = deadline, progress
         self.last: tuple[Motion, ValidationReport] | None = None
-        self.refused: Motion | None = None
+        self.refused: list[Motion] = []
         self.seconds = 0.0
 
     def __call__(self, motion: Motion) -> ValidationReport:
@@ -189,7 +192,7 @@ class _Checker:
             self.seconds += time.perf_counter() - start
         self.last = (motion, report)
         if not report.valid:
-            self.refused = motion
+            self.refused.append(motion)
         return report
 
     def _tell(self, stage: str, share: float) -> None:
@@ -199,8 +202,9 @@ class _Checker:
             self.progress(stage, share)
 
 
-def _answer(name: str, query: Query, checker: _Checker) -> PlanningResult:
+def _answer(question: Question, checker: _Checker) -> PlanningResult:
     """Ask one planner, and the checker about its motion."""
+    name, _, query = question
     checker.seconds = 0.0
     try:
         candidate = PLANNERS[name](query)

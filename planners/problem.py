@@ -276,13 +276,14 @@ class ValidationReport:
 
 
 class PlanningStatus(StrEnum):
-    """Say how planning ended."""
+    """Say how planning ended; IMPOSSIBLE only with a proof."""
 
     SOLVED = "solved"
     NO_PATH = "no path"
     DEAD_END = "dead end"
     NOT_VALID = "not valid"
     OUT_OF_TIME = "out of time"
+    IMPOSSIBLE = "impossible"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -37,6 +37,8 @@ class Query:
         Whether to try everything; otherwise what takes more than some tenths of a second is left.
     checker : callable or None
         Says of a motion whether it is valid, as `planners.validation.validate` does.
+    refused : list of Motion
+        What the checker has refused so far.
     progress : callable or None
         Told about stage and share done.
     surveys : dict
@@ -51,6 +53,7 @@ class Query:
     route: FloatArray | None = None
     thorough: bool = True
     checker: Callable[[Motion], ValidationReport] | None = None
+    refused: list[Motion] = field(default_factory=list, repr=False)
     progress: Progress | None = None
     surveys: dict[int, Geometry | None] = field(default_factory=dict, repr=False)
 

@@ -10,6 +10,7 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import fig19
 from planners import PLANNERS, PlanningStatus, plan, planning, validate
+from planners.portfolio import Question
 
 EVERY = pytest.mark.parametrize("planner", PLANNERS)
 
@@ -73,8 +74,9 @@ def test_every_outcome_is_a_result_with_a_reason(planner, name):
 def test_links_longer_than_the_turn_is_wide_get_a_reason_and_a_place():
     # No rod longer than 440 passes: it must lie across both legs and the wall at some moment.
     result = plan(fig19(), ArmSpec(link_length=445.0))
-    assert result.status is PlanningStatus.DEAD_END
-    assert result.motion is None
+    assert result.status is PlanningStatus.IMPOSSIBLE
+    assert result.motion is None and "No rod of 445 px passes" in result.reason
+    assert 430.0 < result.longest_there <= 440.0
     x, y = result.place
     assert -100 <= x <= 340 and 900 <= y <= 1600
     assert plan(fig19(), ArmSpec(link_length=445.0), planner="beam").status is PlanningStatus.DEAD_END
@@ -106,7 +108,11 @@ def test_a_planner_that_needs_fewer_links_is_found(monkeypatch):
     maze = Maze.load("fig17a")
     with pytest.raises(InputError, match=r"at least 4[89] links"):
         plan(maze, ArmSpec(link_length=245.0, n_links=45), planner="sweep")
-    monkeypatch.setattr(planning, "FIRST", (("sweep", False), ("track", False)))
+    monkeypatch.setattr(
+        planning,
+        "first_questions",
+        lambda query, warm_start: (Question(name, 0, query) for name in ("sweep", "track")),
+    )
     assert plan(maze, ArmSpec(link_length=245.0, n_links=45)).planner == "track"
 
 
