@@ -12,7 +12,7 @@ import math
 import os
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from hrsnake_env.arm import ArmSpec
@@ -67,7 +67,8 @@ class LongestLink:
     motion : Motion or None
         Of the arm with links of that length.
     table : tuple of LengthTrial
-        The ladder of lengths, those that were asked for and the longest; shortest first.
+        The ladder of lengths, those that were asked for, the longest and that of the fewest links; shortest
+        first.
     trials : tuple of LengthTrial
         All lengths that were tried, shortest first.
     untried : tuple of float
@@ -101,6 +102,15 @@ class LongestLink:
         return f"{math.floor(1e4 * self.index + 1e-9) / 1e4:.4f}"
 
     @property
+    def fewest(self) -> LengthTrial | None:
+        """The trial with the fewest links, and of these with the smallest joint range; None if none passes.
+
+        It need not be the longest link: that may only pass on a detour.
+        """
+        passing = [trial for trial in self.trials if trial.passes]
+        return min(passing, key=lambda trial: (trial.n_links, trial.joint_range), default=None)
+
+    @property
     def failed(self) -> tuple[LengthTrial, ...]:
         """Trials of longer links, shortest first, in which the planners gave up by themselves."""
         return tuple(
@@ -124,6 +134,7 @@ class LongestLink:
                 "limited_by": bound.limited_by,
                 "proven": bound.proven,
             },
+            "fewest": None if self.fewest is None else self.fewest.to_dict(),
             "table": [trial.to_dict() for trial in self.table],
             "failed": [trial.link_length for trial in self.failed],
             "out_of_time": [trial.link_length for trial in self.out_of_time],
@@ -276,19 +287,21 @@ class _Search:
         """Sum up what is known."""
         trials, best = self.file.trials, self.file.best
         length = 0.0 if best is None else best.link_length
-        shown = {*self.rungs, length}
         every = tuple(trials[key] for key in sorted(trials))
-        return LongestLink(
+        result = LongestLink(
             length=length,
             bound=self.bound,
             motion=self.file.motion,
-            table=tuple(trial for trial in every if trial.link_length in shown),
+            table=(),
             trials=every,
             untried=tuple(sorted(step for step in self.grid if step > length and step not in trials)),
             complete=complete,
             units=self.question.maze.units,
             note=self.file.note,
         )
+        fewest = result.fewest
+        shown = {*self.rungs, length, *([] if fewest is None else [fewest.link_length])}
+        return replace(result, table=tuple(trial for trial in every if trial.link_length in shown))
 
     def _next(self) -> float | None:
         """Return the length to try next.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -62,21 +63,17 @@ def _mark_lengths(axes: Axes, result: LongestLink) -> None:
     axes.axvline(
         result.bound.upper, color=COLOURS["edge"], linewidth=1.4, linestyle="--", label="no longer rod passes"
     )
-    failed = [trial.link_length for trial in result.trials if not trial.passes]
-    inside = [length for length in failed if length <= result.bound.upper]
-    if inside:
-        axes.plot(
-            inside,
-            np.zeros(len(inside)),
-            marker="x",
-            linestyle="",
-            markersize=5,
-            color=COLOURS["collision"],
-            transform=axes.get_xaxis_transform(),
-            clip_on=False,
-            zorder=5,
-            label="planning failed",
-        )
+    tried = [trial for trial in result.trials if trial.link_length <= result.bound.upper]
+    kinds = {
+        "planning failed": (COLOURS["collision"], [t for t in tried if not t.passes and not t.out_of_time]),
+        "out of time": (COLOURS["edge"], [t for t in tried if t.out_of_time]),
+    }
+    for label, (colour, trials) in kinds.items():
+        if trials:
+            lengths = [trial.link_length for trial in trials]
+            style: dict[str, Any] = {"marker": "x", "linestyle": "", "markersize": 5, "clip_on": False}
+            style |= {"transform": axes.get_xaxis_transform(), "zorder": 5}
+            axes.plot(lengths, np.zeros(len(lengths)), color=colour, label=label, **style)
 
 
 def _sum_up(result: LongestLink) -> str:

@@ -239,6 +239,9 @@ def longest_rows(maze: Maze, result: LongestLink) -> Rows:
     if result.length > 0.0:
         yield "longest link", f"{result.length:.5g} {units}, with a validated motion"
         yield "index I (Eq. 4)", f"at least {result.index_text}"
+        fewest = result.fewest
+        assert fewest is not None  # some length passes
+        yield "fewest links", f"{fewest.n_links}, of {fewest.link_length:.5g} {units}"
     else:
         yield "longest link", "none: no length that was tried passes"
     way = "the straight way in front of the base" if bound.limited_by == "feeder" else "the maze"

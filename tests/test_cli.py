@@ -46,7 +46,7 @@ def run(capsys, monkeypatch):
 
 
 def test_plan_writes_a_motion_that_validates_and_simulates(run):
-    code, out, err = run("plan", "fig19", "--link-length", 430, "--out", "m.npz")
+    code, out, err = run("plan", "fig19", "--link-length", 430, "--planner", "sweep", "--out", "m.npz")
     assert (code, err) == (0, "")
     assert "solved" in out and "7 links of 430 px" in out and "Written: m.npz" in out
     code, out, _ = run("validate", "fig19", "m.npz")
@@ -57,7 +57,7 @@ def test_plan_writes_a_motion_that_validates_and_simulates(run):
 
 def test_json_is_one_object_on_one_line(run, motion):
     motion.save("m.npz")
-    code, out, _ = run("plan", "fig19", "--link-length", 430, "--json")
+    code, out, _ = run("plan", "fig19", "--link-length", 430, "--planner", "sweep", "--json")
     assert code == 0 and len(out.splitlines()) == 1
     data = json.loads(out)
     assert data["status"] == "solved" and data["n_links"] == 7 and data["validation"]["penetration"] == 0.0
@@ -71,13 +71,14 @@ def test_json_is_one_object_on_one_line(run, motion):
 
 
 def test_no_plan_is_exit_code_3_with_a_reason_and_nothing_written(run):
-    code, out, err = run("plan", "fig19", "--link-length", 445, "--out", "m.npz")
+    code, out, err = run("plan", "fig19", "--link-length", 445, "--planner", "sweep", "--out", "m.npz")
     assert (code, err) == (3, "")
     assert "dead end" in out and "stays free" in " ".join(out.split()) and "place" in out
     assert not Path("m.npz").exists()
     code, out, _ = run("plan", "fig19", "--link-length", 445, "--json")
     data = json.loads(out)
-    assert code == 3 and data["status"] == "dead end" and len(data["place"]) == 2
+    assert code == 3 and data["status"] == "impossible" and len(data["place"]) == 2
+    assert data["reason"].startswith("No rod of 445 px passes") and len(data["attempts"]) >= 2
 
 
 def test_a_motion_that_is_not_valid_is_exit_code_3(run, motion):

@@ -65,7 +65,9 @@ def test_the_table_has_the_ladder_the_lengths_asked_for_and_the_longest(answer):
     assert lengths == sorted(lengths) and {200.0, 900.0, answer.length} <= set(lengths)
     assert lengths[0] <= 0.26 * answer.bound.upper
     passing = [trial for trial in answer.table if trial.passes]
+    assert answer.fewest in answer.table
     links = [trial.n_links for trial in passing]
+    assert answer.fewest.n_links == min(links)
     assert links == sorted(links, reverse=True) and links[0] > links[-1]
     assert [trial.n_actuators for trial in passing] == [n + 1 for n in links]
     assert all(0.0 < trial.joint_range < math.pi for trial in passing)
