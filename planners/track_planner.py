@@ -77,6 +77,9 @@ LEAST_SLOPE, SLOPE_SLACK = 0.1, 4.8
 """Cosine between a chord and the track at its start; a track of n samples per link may fall short by the
 slack over n, as it turns by that much from sample to sample."""
 
+LONGEST_SPAN = 5
+"""Link lengths of track that one constraint may tie together; a track that coils up more is lost."""
+
 SMOOTH, SMOOTH_DECAY, LEAST_SMOOTH = 1e-4, 0.5, 1e-8
 """Weight of the track's bending at the first step, its factor from step to step, and its smallest value."""
 
@@ -243,7 +246,7 @@ def _from_motion(query: Query, motion: Motion) -> tuple[_Track | None, Scene | N
 
 
 def _coarse(line: FloatArray, scene: Scene) -> tuple[FloatArray, int]:
-    """Sample a free line, with the axis in front of it, so that it stays free; return samples per link too."""
+    """Sample a free line, the axis in front of it, so that it stays free; return samples per link too."""
     for per_link in COARSE:
         points = with_axis(line, per_link)
         if edges_are_free(points, per_link, scene.near):
@@ -281,6 +284,9 @@ def _measured(points: FloatArray, per_link: int, chord: float, scene: Scene, wei
     normals, move, new = np.empty((n, 2)), np.empty(n - fixed), np.empty((n, 2))
     find_normals(points, normals)
     width = project_rows(n_rows, fixed, normals, rows) + 1
+    if width > LONGEST_SPAN * per_link:
+        lacking[:, 0], lacking[:, 1] = np.inf, chords.end[int(lacking[kernel.CORNER, 1])]
+        return track
     solve_rows(
         points, normals, fixed, n_rows, rows, weights.smooth, weights.stiff, weights.tether,
         np.empty((n - fixed, width)), np.empty(n - fixed, dtype=np.int64), move, np.empty(n - fixed),
@@ -313,8 +319,13 @@ def _room_for_rows(most: int) -> Rows:
 
 
 def _moved(track: _Track, scene: Scene, weights: _Weights, chord: float | None = None) -> _Track:
-    """Move the samples of a track to where they should go, and measure it again."""
+    """Move the samples of a track to where they should go, and measure it again.
+
+    They are spread evenly again, unless the track would cut a corner then.
+    """
     points = with_axis(track.next_points[track.per_link :], track.per_link)
+    if not edges_are_free(points, track.per_link, scene.near):
+        points = track.next_points
     return _measured(points, track.per_link, track.chord if chord is None else chord, scene, weights)
 
 

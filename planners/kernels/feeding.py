@@ -212,7 +212,8 @@ def _in_feeder(ax: float, ay: float, bx: float, by: float, base_pose: FloatArray
     along = (ax - base_pose[0]) * cos + (ay - base_pose[1]) * sin
     start = abs((ay - base_pose[1]) * cos - (ax - base_pose[0]) * sin)
     end = abs((by - base_pose[1]) * cos - (bx - base_pose[0]) * sin)
-    return along < 0.0 and start <= 1e-9 * size and end <= 1e-9 * size
+    behind: bool = along < 0.0 and start <= 1e-9 * size and end <= 1e-9 * size
+    return behind
 
 
 @njit(cache=True)

@@ -14,6 +14,9 @@ LONGEST_MOVE = 0.12
 REACH = 0.15
 """Walls within this distance of a sample, and corners within this distance of a chord, are looked at."""
 
+HALVINGS = 4
+"""How often a movement is halved where it would meet a wall, before it is given up."""
+
 SLIP = 0.3
 """How far the track between two samples may cut a corner and still count as having slipped, in spacings. What
 is deeper belongs to the other side of a thin wall."""
@@ -188,22 +191,26 @@ def apply_move(
     new[:fixed] = points[:fixed]
     for i in range(fixed, n):
         size = min(max(move[i - fixed], -LONGEST_MOVE), LONGEST_MOVE)
-        for halving in range(5):
-            if halving == 4 or not np.isfinite(size):
+        for halving in range(HALVINGS + 1):
+            if halving == HALVINGS or not np.isfinite(size):
                 size = 0.0
             new[i, 0] = points[i, 0] + size * normals[i, 0]
             new[i, 1] = points[i, 1] + size * normals[i, 1]
             if not _meets_near(points[i, 0], points[i, 1], new[i, 0], new[i, 1], near):
                 break
             size *= 0.5
-    # Both ends of an edge may be free and the edge not: take the ends back halfway, and again.
-    for _ in range(6):
+    # Both ends of an edge may be free and the edge not: take the ends back halfway, and in the end wholly.
+    for number in range(HALVINGS + n):
         clean = True
         for i in range(fixed - 1, n - 1):
             if _meets_near(new[i, 0], new[i, 1], new[i + 1, 0], new[i + 1, 1], near):
-                clean = False
                 for k in (i, i + 1):
-                    new[k, 0] = 0.5 * (new[k, 0] + points[k, 0])
-                    new[k, 1] = 0.5 * (new[k, 1] + points[k, 1])
+                    if new[k, 0] != points[k, 0] or new[k, 1] != points[k, 1]:
+                        clean = False
+                        if number < HALVINGS:
+                            new[k, 0] = 0.5 * (new[k, 0] + points[k, 0])
+                            new[k, 1] = 0.5 * (new[k, 1] + points[k, 1])
+                        else:
+                            new[k, 0], new[k, 1] = points[k, 0], points[k, 1]
         if clean:
             return
