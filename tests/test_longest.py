@@ -80,7 +80,7 @@ def test_a_length_beyond_the_bound_is_never_planned(asked):
     answer = longest_link(bend(), "sweep", accuracy=0.2, lengths=(900.0,))
     assert max(asked) <= answer.bound.upper
     (beyond,) = [trial for trial in answer.table if trial.link_length == 900.0]
-    assert beyond.status is PlanningStatus.NO_PATH and beyond.reason.startswith("No rod longer than")
+    assert beyond.status is PlanningStatus.IMPOSSIBLE and beyond.reason.startswith("No rod longer than")
 
 
 def test_joint_speed_is_that_of_the_joint_that_travels_farthest():
