@@ -121,6 +121,9 @@ corner is taken first; otherwise it is the first of the variants."""
 LONGEST_STEPS, LONGEST_RATIO = 220, 0.995
 """How far down, and how finely, the longest link past a place is looked for."""
 
+CHUNK = 20_000
+"""Vertices between two looks at the clock."""
+
 MAX_ATTEMPTS = 150
 """Tracks that are tried at one fineness."""
 
@@ -331,7 +334,7 @@ class _Search:
             [VARIANTS[k] for k in chosen],
             float(self.query.arm.link_length),
         )
-        track = grow(self.geometry, self.query.arm, fineness, aim, earlier)
+        track = grow(self.geometry, self.query.arm, fineness, aim, earlier, self.query.deadline)
         self.left, self.work = self.left - 1, self.work - (track.n - track.resumed)
         if self.best is None or track.index > self.best.index:
             self.best = track
@@ -351,7 +354,12 @@ class _Search:
 
 
 def grow(
-    geometry: Geometry, arm: ArmSpec, fineness: Fineness, aim: FloatArray, earlier: Track | None = None
+    geometry: Geometry,
+    arm: ArmSpec,
+    fineness: Fineness,
+    aim: FloatArray,
+    earlier: Track | None = None,
+    deadline: float = math.inf,
 ) -> Track:
     """Grow a joint track along an aim line.
 
@@ -367,6 +375,8 @@ def grow(
         One point for each path point (`aim_line`).
     earlier : Track, optional
         Of the same fineness, with another aim: the new track is the same up to where the aims differ.
+    deadline : float
+        When to stop, on the clock of `time.perf_counter`.
     """
     path, length = geometry.path, float(arm.link_length)
     n_lengths = path.length / length
@@ -388,32 +398,35 @@ def grow(
         gaps=np.empty((8 * n_max, 2)),
     )
     resumed = 0 if earlier is None else _common(track, earlier, path.s, length)
-    n, ending = kernel.grow_track(
-        length,
-        math.inf if arm.joint_limit is None else float(arm.joint_limit),
-        geometry.maze.base_pose,
-        geometry.maze.goal,
-        geometry.maze.goal_radius,
-        path.points,
-        path.length - path.s,
-        aim,
-        max(1, round(SEARCH_REACH * length / path.s[1])),
-        geometry.maze.walls,
-        fineness.per_link,
-        fineness.overlap,
-        PAD,
-        SOFTENING,
-        resumed,
-        track.points,
-        track.start,
-        track.headings,
-        track.indices,
-        track.credits,
-        track.waits,
-        track.first,
-        track.gaps,
-        np.empty(len(track.gaps), dtype=np.bool_),
-    )
+    n, ending = resumed, kernel.PAUSED
+    while ending == kernel.PAUSED and time.perf_counter() < deadline:
+        n, ending = kernel.grow_track(
+            length,
+            math.inf if arm.joint_limit is None else float(arm.joint_limit),
+            geometry.maze.base_pose,
+            geometry.maze.goal,
+            geometry.maze.goal_radius,
+            path.points,
+            path.length - path.s,
+            aim,
+            max(1, round(SEARCH_REACH * length / path.s[1])),
+            geometry.maze.walls,
+            fineness.per_link,
+            fineness.overlap,
+            PAD,
+            SOFTENING,
+            n,
+            n + CHUNK,
+            track.points,
+            track.start,
+            track.headings,
+            track.indices,
+            track.credits,
+            track.waits,
+            track.first,
+            track.gaps,
+            np.empty(len(track.gaps), dtype=np.bool_),
+        )
     return dataclasses.replace(track, n=n, resumed=resumed, ending=ending)
 
 

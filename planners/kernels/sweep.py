@@ -17,8 +17,9 @@ from planners.kernels.types import BoolArray, FloatArray, IntArray
 
 TWO_PI = 2.0 * np.pi
 
-GOAL, DEAD_END, FULL = 0, 1, 2
-"""How a track ends: at the goal; where no direction stays free during the next link length of feed; full."""
+GOAL, DEAD_END, FULL, PAUSED = 0, 1, 2, 3
+"""How a track ends: at the goal; where no direction stays free during the next link length of feed; full; not
+yet, but for the number of vertices asked for."""
 
 FASTEST = 1.9
 """Largest movement of the tip from vertex to vertex, in steps. Starts that go several vertices at once move
@@ -289,6 +290,7 @@ def grow_track(
     pad: float,
     softening: float,
     resumed: int,
+    most: int,
     track: FloatArray,
     start: IntArray,
     headings: FloatArray,
@@ -336,6 +338,8 @@ def grow_track(
     resumed : int
         Number of vertices of the arrays that are filled already, by a run that differs from here on; 0 for
         none, otherwise more than the straight ones.
+    most : int
+        Number of vertices at which to pause.
     track : array, shape (n_max, 2)
         Filled with the vertices: first the axis from a link length behind the base to one in front of it.
     start, headings, indices : array, shape (n_max,)
@@ -353,14 +357,14 @@ def grow_track(
     Returns
     -------
     n, ending : int
-        Number of vertices, and one of GOAL, DEAD_END and FULL.
+        Number of vertices, and one of GOAL, DEAD_END, FULL and PAUSED.
     """
     step, turn = length / per_link, 1.0 / per_link
     slack = overlap * turn
     straight = 2 * per_link
-    most = walls.shape[0] + 1
-    blocked, found = np.empty((most, 2)), np.empty((most, 2))
-    reached, reached_next = np.zeros(most, dtype=np.bool_), np.zeros(most, dtype=np.bool_)
+    n_gaps = walls.shape[0] + 1
+    blocked, found = np.empty((n_gaps, 2)), np.empty((n_gaps, 2))
+    reached, reached_next = np.zeros(n_gaps, dtype=np.bool_), np.zeros(n_gaps, dtype=np.bool_)
     before = np.empty_like(viable)
     turns = np.array([0.0, 1.0, -1.0, 0.5, -0.5, 0.25, -0.25])
     if resumed == 0:
@@ -377,7 +381,7 @@ def grow_track(
     viable[first[s] : first[n]] = True
     _prune(s, n - 1, first, gaps, viable, slack, True)
     last_distance = np.inf
-    while n < track.shape[0]:
+    while n < min(most, track.shape[0]):
         distance = np.hypot(track[n - 1, 0] - goal[0], track[n - 1, 1] - goal[1])
         if distance <= 0.5 * goal_radius:
             return n, GOAL
@@ -463,7 +467,7 @@ def grow_track(
         start[n], headings[n], indices[n], credits[n], waits[n] = origin, new, index, credit, waited
         s, heading = origin, new
         n += 1
-    return n, FULL
+    return n, FULL if n == track.shape[0] else PAUSED
 
 
 @njit(cache=True)
