@@ -48,8 +48,8 @@ def start_from_path(scene: Scene, path: FloatArray) -> FloatArray:
         Free; begins at the end of the axis.
     """
     s = _arclength(path)
-    first, last = np.searchsorted(s, [NEAREST_JOINT, FARTHEST_JOINT])
-    index = _joint(scene, AXIS_END, AXIS_END, path, _spread(int(first), min(int(last), len(path) - 1)), s)
+    first, last = np.minimum(np.searchsorted(s, [NEAREST_JOINT, FARTHEST_JOINT]), len(path) - 1)
+    index = _joint(scene, AXIS_END, AXIS_END, path, _spread(int(first), int(last)), s)
     return np.concatenate([[AXIS_END], path[len(path) - 1 if index is None else index :]])
 
 

@@ -134,6 +134,14 @@ def test_links_too_thick_for_the_corridor_find_no_path(planner):
 
 
 @EVERY
+@pytest.mark.parametrize("away", [80.0, 160.0, 240.0, 330.0])
+def test_a_goal_within_the_first_links_has_an_outcome(planner, away):
+    maze = Maze.from_corridors([(0, 0), (0, 1500)], 200.0, goal=(40.0, 5.0 + away))
+    result = plan(maze, ArmSpec(link_length=300.0), planner=planner)
+    assert result.solved or result.reason
+
+
+@EVERY
 def test_joint_limits_hold(planner):
     free = plan(fig19(), ArmSpec(link_length=250.0), planner=planner)
     largest = np.abs(free.motion.joint_angles).max()
