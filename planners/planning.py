@@ -107,7 +107,7 @@ def plan(
     query = Query(
         maze=maze, arm=arm, deadline=deadline, checker=checker, refused=checker.refused, progress=progress
     )
-    hearing = _Hearing(checker)
+    hearing, proof = _Hearing(checker), ""
     if planner != "auto":
         own = Question(planner, 0, dataclasses.replace(query, warm_start=warm_start))
         result = hearing.first_solved(iter([own]))
@@ -116,14 +116,15 @@ def plan(
         if result is None and hearing.shortage is None and not query.late and query.geometry is not None:
             rod = rod_passes(maze, arm.link_length, arm.link_radius, resolution=ROD, deadline=deadline)
             if rod.passes is Passage.NO:
-                hearing.impossible(f"No rod of {arm.link_length:g} {maze.units} passes: this is proved.")
+                proof = f"No rod of {arm.link_length:g} {maze.units} passes: this is proved."
             else:
                 result = hearing.first_solved(further_questions(query, rod.path))
     if result is not None:
         return result
     if hearing.shortage is not None:
         raise hearing.shortage
-    return _explained(hearing.failure(), query) if explain else hearing.failure()
+    failure = hearing.failure(proof)
+    return _explained(failure, query) if explain else failure
 
 
 class _Hearing:
@@ -150,21 +151,28 @@ class _Hearing:
             )
             if result.solved:
                 return dataclasses.replace(result, attempts=tuple(self.attempts))
-            self.failures.append(result)
+            if question.route == 0:
+                self.failures.append(result)
             if question.query.late:
                 break
         return None
 
-    def impossible(self, proof: str) -> None:
-        """Note that no planner can have a motion."""
-        first = self.failures[0]
-        self.failures[0] = dataclasses.replace(
-            first, status=PlanningStatus.IMPOSSIBLE, reason=f"{proof} {first.reason}"
-        )
+    def failure(self, proof: str = "") -> PlanningResult:
+        """Return the failure that says best what is in the way: the link that is least deep in a wall.
 
-    def failure(self) -> PlanningResult:
-        """Return the first failure, with the record."""
-        return dataclasses.replace(self.failures[0], attempts=tuple(self.attempts))
+        With a `proof`, that no planner can have a motion.
+        """
+        result = min(self.failures, key=_depth)
+        if proof:
+            result = dataclasses.replace(
+                result, status=PlanningStatus.IMPOSSIBLE, reason=f"{proof} {result.reason}"
+            )
+        return dataclasses.replace(result, attempts=tuple(self.attempts))
+
+
+def _depth(result: PlanningResult) -> float:
+    depth = None if result.failure is None else result.failure.depth
+    return math.inf if depth is None else depth
 
 
 class _Late(Exception):
