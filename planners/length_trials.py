@@ -97,11 +97,17 @@ class LengthTrial:
         cls, link_length: float, result: PlanningResult, seconds: float, time_budget: float
     ) -> LengthTrial:
         """Take the figures of a planning result."""
-        motion = result.motion
+        motion, status = result.motion, result.status
         figures: dict[str, Any] = {} if motion is None else _figures(motion)
+        # A result names the first planner's failure; that the last one had no time left makes it undecided.
+        late = seconds >= time_budget or any(
+            attempt.status is PlanningStatus.OUT_OF_TIME for attempt in result.attempts
+        )
+        if late and status not in (PlanningStatus.SOLVED, PlanningStatus.IMPOSSIBLE):
+            status = PlanningStatus.OUT_OF_TIME
         return cls(
             link_length=link_length,
-            status=result.status,
+            status=status,
             planner=result.planner,
             reason=result.reason,
             seconds=seconds,

@@ -7,13 +7,14 @@ import math
 import numpy as np
 import pytest
 
-import planners.length_trials as length_trials
 import planners.longest as longest
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
-from planners import Motion, PlanningStatus, longest_link, plan, validate
+from planners import Motion, PlanningResult, PlanningStatus, longest_link, plan, validate
+from planners.length_trials import LengthTrial
 from planners.longest_chart import draw_longest
+from planners.problem import Attempt
 
 LIMIT = 200.0 * 2.0 * math.sqrt(2.0)
 """The longest rod round a right-angled bend of width 200: twice the diagonal of the corner's square."""
@@ -87,7 +88,7 @@ def test_joint_speed_is_that_of_the_joint_that_travels_farthest():
     # One link, pushed out by 2 of 4 and then turned by 0.1 rad about its base-side joint.
     turned = Motion.from_configurations([4.0, 6.0, 6.0], [[0, 0], [0, 0], [0, 0.1]], 4.0, (0, 0, 0))
     result = longest.plan(bend(), ArmSpec(link_length=300.0))
-    trial = length_trials.LengthTrial.from_result(4.0, dataclasses.replace(result, motion=turned), 0.0, 1.0)
+    trial = LengthTrial.from_result(4.0, dataclasses.replace(result, motion=turned), 0.0, 1.0)
     assert trial.joint_speed == pytest.approx(0.1 / (8.0 * math.sin(0.05)))
     assert (trial.joint_range, trial.turning, trial.n_actuators) == (0.1, 0.1, 3)
 
@@ -161,6 +162,24 @@ def test_a_length_that_lacked_time_is_said_and_asked_again_with_more_time_only(t
     assert longest_link(bend(), "sweep", time_budget=5.0, **options).length == first.length and calls == []
     longest_link(bend(), "sweep", time_budget=6.0, **options)
     assert set(calls) == {trial.link_length for trial in first.out_of_time}
+
+
+@pytest.mark.parametrize(
+    ("status", "last", "seconds", "undecided"),
+    [
+        (PlanningStatus.DEAD_END, PlanningStatus.DEAD_END, 1.0, False),
+        (PlanningStatus.DEAD_END, PlanningStatus.OUT_OF_TIME, 1.0, True),
+        (PlanningStatus.DEAD_END, PlanningStatus.DEAD_END, 9.0, True),
+        (PlanningStatus.IMPOSSIBLE, PlanningStatus.OUT_OF_TIME, 9.0, False),
+    ],
+)
+def test_a_length_is_undecided_if_any_planner_lacked_time(status, last, seconds, undecided):
+    attempts = tuple(
+        Attempt(planner="sweep", route=0, status=each, seconds=1.0)
+        for each in (PlanningStatus.DEAD_END, last)
+    )
+    result = PlanningResult(status=status, planner="track", attempts=attempts)
+    assert LengthTrial.from_result(300.0, result, seconds, 9.0).out_of_time == undecided
 
 
 def test_where_nothing_passes_the_answer_is_zero_with_all_reasons(tmp_path):
