@@ -38,6 +38,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+bench_app = typer.Typer(help="Measure, and print tables to paste.")
+app.add_typer(bench_app, name="bench")
+
 # Some versions of typer carry their own copy of click: its base of all usage errors is found by name.
 UsageError: type[Exception] = next(
     cls for cls in typer.BadParameter.__mro__ if cls.__name__ == "ClickException"
@@ -244,6 +247,27 @@ def demo_command(
     _print(as_json, demo.to_dict(), lambda: tables.show_demo(demo))
     if not demo.clean:
         raise typer.Exit(NOT_CLEAN)
+
+
+@bench_app.command("speed")
+def bench_speed_command(
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Fewer and smaller mazes: under a minute, not ten.")
+    ] = False,
+    parts: Annotated[str, typer.Option("--parts", help="Some of the parts, as stages,links.")] = "",
+    out: Annotated[Path | None, typer.Option("--out", help="Write all figures (.json).")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure speed and scale: stages, growth, memory, first call, random mazes, and OMPL beside."""
+    from planners.bench import speed
+    from planners.bench.speed_tables import speed_markdown
+
+    _check_output(out, (".json",))
+    chosen = tuple(part.strip() for part in parts.split(",")) if parts else speed.PARTS
+    results = speed.run_speed(speed.QUICK if quick else speed.FULL, parts=chosen, quiet=as_json)
+    if out is not None:
+        speed.write_speed(results, out)
+    _print(as_json, results, lambda: print(speed_markdown(results)))
 
 
 def main() -> None:

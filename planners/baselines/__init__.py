@@ -1,0 +1,1 @@
+"""Planners of others, for comparison: functions of a query like ours, before the same checker."""

@@ -1,0 +1,1 @@
+"""Measurements of speed and scale, beside other planners, in one run."""
