@@ -26,7 +26,7 @@ from planners.validation import validate
 
 __all__ = ["ACCURACY", "TIME_BUDGET", "LongestLink", "longest_link"]
 
-VERSION = 1
+VERSION = 2
 """Part of a state's digest: raise it when planners learn to pass what they did not."""
 
 ACCURACY = 0.0025
@@ -43,6 +43,9 @@ BOUND_BUDGET = 60.0
 
 FRACTIONS = (0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
 """The ladder of lengths in the table, as shares of the bound, before they are rounded to three digits."""
+
+FINER = 0.2
+"""In the end, how close to a length that failed the longest is brought, in steps of the grid."""
 
 STRIDES = (32, 16, 8, 4, 2, 1)
 """Which steps of the grid above the best are tried first: every 32nd, and so on."""
@@ -308,7 +311,7 @@ class _Search:
 
         First the rungs of the ladder, the middle one before the others, until one passes. Then between the
         best and the nearest longer length that failed, halving; then the other rungs; then every step that is
-        left above the best, first few and far between, then ever closer.
+        left above the best, first few and far between, then ever closer; last, what lies between two steps.
         """
         trials, best = self.file.trials, self.file.best
         rungs = sorted(self.rungs, key=lambda length: abs(length - 0.5 * self.bound.upper))
@@ -324,7 +327,14 @@ class _Search:
             return rungs[0]
         strides = (above[::stride] for stride in STRIDES)
         left = (length for steps in strides for length in steps[::-1] if length not in trials)
-        return next(left, None)
+        return next(left, None) or self._finer(best.link_length)
+
+    def _finer(self, best: float) -> float | None:
+        """Return a length halfway from the best to the nearest longer one that failed, while that is far."""
+        above = min((length for length in self.file.trials if length > best), default=self.bound.upper)
+        if above - best <= FINER * self.question.accuracy * best:
+            return None
+        return 0.5 * (best + above)
 
     def _try(self, length: float) -> None:
         ask, start = self.question, time.perf_counter()
