@@ -7,6 +7,7 @@ and, where a planner wants goal states, whole arms at the goal.
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import math
 import time
@@ -104,6 +105,8 @@ def plan_ompl(
         )
     arm = FedArm(query, given.n_links)
     goals = arm.goal_states(given, np.random.default_rng(seed))
+    arm.edge_is_free(goals[0], goals[0])  # the first call compiles it
+    importlib.import_module("ompl.geometric")
     clock.append(time.perf_counter())
     limit = min(time_limit, query.deadline - clock[-1])
     states = _solve(arm, goals, algorithm, seed, limit)

@@ -57,6 +57,7 @@ def beside_ompl(
     """
     with worker_pool(workers, warm_up) as pool:
         runs = list(over_processes(pool, run_one, tasks, tell))
+    links = {(run["turns"], run["index"]): run["n_links"] for run in runs if run["planner"] == OURS[0]}
     rows = []
     for turns, index, planner in dict.fromkeys(task[:3] for task in tasks):
         chosen = [
@@ -73,7 +74,7 @@ def beside_ompl(
                     outcome: sum(run["outcome"] == outcome for run in chosen)
                     for outcome in ("valid", "invalid", "unsolved")
                 },
-                "n_links": max((run["n_links"] or 0 for run in chosen), default=0) or None,
+                "n_links": next((run["n_links"] for run in valid), links.get((turns, index))),
                 "median_s": float(np.median([run["seconds"] for run in valid])) if valid else None,
                 "faults": sorted({run["fault"] for run in chosen if run["fault"]}),
             }

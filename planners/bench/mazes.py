@@ -7,7 +7,7 @@ from typing import Any
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.maze import Maze
-from planners.planning import plan
+from planners.planning import PLANNERS, plan
 from planners.rod_bound import rod_bound, rod_passes
 
 __all__ = ["longest_in_maze", "plan_in_maze", "rod_in_maze", "warm_up"]
@@ -20,9 +20,10 @@ SHORTEST = 0.5
 
 
 def warm_up() -> None:
-    """Load the compiled kernels, by planning one motion."""
+    """Load the compiled kernels, by planning one motion with each planner."""
     maze = Maze.load("fig19")
-    plan(maze, ArmSpec(link_length=430.0))
+    for planner in PLANNERS:
+        plan(maze, ArmSpec(link_length=430.0), planner)
     rod_passes(maze, 430.0)
 
 
