@@ -163,9 +163,16 @@ class _Hearing:
         With a `proof`, that no planner can have a motion.
         """
         result = min(self.failures, key=_depth)
+        late = any(attempt.status is PlanningStatus.OUT_OF_TIME for attempt in self.attempts)
         if proof:
             result = dataclasses.replace(
                 result, status=PlanningStatus.IMPOSSIBLE, reason=f"{proof} {result.reason}"
+            )
+        elif late and result.status is not PlanningStatus.OUT_OF_TIME:
+            result = dataclasses.replace(
+                result,
+                status=PlanningStatus.OUT_OF_TIME,
+                reason=f"Time was over before everything was tried. {result.reason}",
             )
         return dataclasses.replace(result, attempts=tuple(self.attempts))
 

@@ -1,9 +1,12 @@
 """Contracts of plan(), over all planners and many mazes."""
 
 import math
+import time
 
 import numpy as np
 import pytest
+from shapely import unary_union
+from shapely.geometry import box
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
@@ -11,6 +14,7 @@ from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import fig19
 from planners import PLANNERS, PlanningStatus, plan, planning, validate
 from planners.portfolio import Question
+from planners.problem import Candidate
 
 EVERY = pytest.mark.parametrize("planner", PLANNERS)
 
@@ -149,6 +153,46 @@ def test_joint_limits_hold(planner):
     result = plan(fig19(), ArmSpec(link_length=250.0, joint_limit=limit), planner=planner)
     assert result.solved, result.reason
     assert np.abs(result.motion.joint_angles).max() <= limit + 1e-9
+
+
+def test_links_at_the_physical_limit_are_solved_by_auto():
+    result = plan(fig19(), ArmSpec(link_length=439.6))
+    assert result.solved and str(result.attempts[-1]).endswith("solved")
+
+
+def test_a_time_budget_is_kept_and_said(monkeypatch):
+    monkeypatch.setattr(
+        planning, "rod_passes", lambda *args, **kwargs: RodVerdict(passes="undecided", length=1.0)
+    )
+    maze, arm = Maze.load("S200"), ArmSpec(link_length=430.0)
+    plan(maze, arm, time_budget=20.0, explain=False)  # compiles
+    start = time.perf_counter()
+    result = plan(maze, arm, time_budget=0.05)
+    assert time.perf_counter() - start < 1.0  # one step of a planner at most, on a busy machine
+    assert result.status is PlanningStatus.OUT_OF_TIME and "time " in result.reason
+
+
+def test_where_the_potential_leads_into_a_narrow_way_another_way_is_found():
+    # The potential prefers the short way between the pillars, which is too narrow for links to turn in.
+    free = box(0, 0, 1600, 900).difference(unary_union([box(300, 0, 1250, 380), box(300, 520, 1250, 560)]))
+    maze = Maze(name="ways", free_space=free, base_pose=(5, 450, 0), goal=(1350, 150), goal_radius=25)
+    for length in (200.0, 280.0, 320.0):
+        result = plan(maze, ArmSpec(link_length=length), explain=False)
+        assert result.solved, result.reason
+
+
+def test_a_refused_motion_says_where_it_is_refused(monkeypatch):
+    bad = plan(fig19(), ArmSpec(link_length=430.0)).motion
+    moved = fig19(l1=196, l2=196, wall=44, end_gap=196)
+    monkeypatch.setitem(
+        PLANNERS, "sweep", lambda query: Candidate(status=PlanningStatus.SOLVED, motion=bad, timings={})
+    )
+    result = plan(moved, ArmSpec(link_length=430.0), planner="sweep")
+    assert result.status is PlanningStatus.NOT_VALID and result.motion is None
+    assert result.failure.depth == pytest.approx(2.0, abs=0.5)
+    x, y = result.failure.place
+    wall = moved.walls[result.failure.wall]
+    assert min(np.hypot(*(wall - (x, y)).T)) < 1600.0 and result.failure.path_position > 0.0
 
 
 @pytest.mark.parametrize(

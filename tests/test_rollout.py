@@ -52,6 +52,14 @@ def test_the_papers_links_merely_pinch_the_walls(episode):
     assert report.kinematic.collision == 0
 
 
+@pytest.mark.parametrize(("name", "length"), [("fig19", 439.2), ("S400", 446.0), ("stairs", 310.0)])
+def test_links_at_the_physical_limit_merely_pinch_the_walls(name, length):
+    maze, arm = Maze.load(name), ArmSpec(link_length=length)
+    episode = simulate_motion(plan(maze, arm).motion, maze, arm)
+    assert episode.success and episode.report.clean
+    assert episode.report.kinematic.pinch > 0 and episode.report.kinematic.collision == 0
+
+
 def test_the_arm_follows_its_plan(benchmark, episode):
     assert episode.report.node_error < NODE_ERROR
     assert episode.report.drift < NODE_ERROR
