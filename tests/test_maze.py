@@ -10,7 +10,7 @@ from shapely.geometry import MultiPolygon, Polygon, box
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
-from hrsnake_env.mazes import LEGS, MAZES, corridor_family, fig19
+from hrsnake_env.mazes import LEGS, MAZES, corridor_family, fig19, serpentine
 
 
 def hall(**changes):
@@ -182,7 +182,7 @@ def test_bad_maze_files_are_refused_in_one_sentence(data, message, tmp_path):
 
 
 def test_unknown_names_list_what_there_is():
-    with pytest.raises(InputError, match=r"Unknown maze 'fig20'\. Available: fig19, L, U40") as raised:
+    with pytest.raises(InputError, match=r"Unknown maze 'fig20'\. Available: fig19, fig17a") as raised:
         Maze.load("fig20")
     assert all(name in str(raised.value) for name in MAZES)
 
@@ -234,3 +234,31 @@ def test_fig19_refuses_bad_lengths(key, value):
 def test_corridors_refuse_bad_widths(width):
     with pytest.raises(InputError, match="Expected a positive, finite corridor width"):
         Maze.from_corridors([(0, 0), (0, 9)], width)
+
+
+@pytest.mark.parametrize("name", ["clutter-3", "corridor-3"])
+def test_seeded_mazes_are_drawn_from_their_seed_alone(name):
+    maze, again = Maze.load(name), Maze.load(name)
+    assert maze.name == name and maze.free_space.equals(again.free_space)
+    assert not maze.free_space.equals(Maze.load(f"{name}4").free_space)
+
+
+def test_a_clutter_hall_has_28_pillars_and_room_for_the_first_link():
+    for seed in range(10):
+        hall = Maze.load(f"clutter-{seed}")
+        hall.check_arm(ArmSpec(link_length=290.0, link_radius=20.0))
+        assert hall.free_space.area < 2000 * 1400 - 28 * 1500 / 4  # some may stand in one another
+
+
+@pytest.mark.parametrize("name", ["corridor-x", "corridor-", "corridor--1", "clutter-1.5", "fig19-1"])
+def test_a_seed_is_a_whole_number(name):
+    with pytest.raises(InputError, match="corridor-SEED"):
+        Maze.load(name)
+
+
+@pytest.mark.parametrize("n_turns", [1, 4])
+def test_a_serpentine_has_as_many_legs_as_turns_and_one(n_turns):
+    maze = serpentine(n_turns, width=100.0, pitch=120.0, leg=800.0)
+    assert maze.free_space.area == pytest.approx(
+        100.0 * ((n_turns + 1) * 800.0 + n_turns * 120.0 + 320.0), rel=1e-9
+    )

@@ -64,7 +64,7 @@ def test_solved_means_that_the_checker_agrees(planner):
 @pytest.mark.parametrize("name", ["fig19", "L", "S0", "stairs"])
 def test_every_outcome_is_a_result_with_a_reason(planner, name):
     maze = Maze.load(name)
-    result = plan(maze, ArmSpec(link_length=300.0), planner=planner)
+    result = plan(maze, ArmSpec(link_length=300.0), planner=planner, time_budget=4.0)
     assert (result.motion is not None) == result.solved
     if result.solved:
         assert result.reason == "" and result.report.valid
