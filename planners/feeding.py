@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planners.kernels import feeding as kernel
+from planners.kernels.feeding_sweep import Sweep, sweep_chords
 from planners.kernels.types import FloatArray
 from planners.problem import Motion
 
@@ -23,6 +24,17 @@ MOST_POSES_PER_LINK = 2000
 """Largest number of poses per link length of track; a joint that needs more is about to jump."""
 
 
+UNCHECKED = Sweep(
+    walls=np.empty((0, 2, 2)),
+    low=np.empty(0),
+    high=np.empty(0),
+    first=np.empty(0, dtype=np.int64),
+    members=np.empty(0, dtype=np.int64),
+    crosses=np.empty(0, dtype=np.bool_),
+)
+"""For feeding whatever the arm may meet."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Feeding:
     """Hold what came of feeding an arm along a track.
@@ -32,7 +44,7 @@ class Feeding:
     poses : array, shape (n_poses, n_links + 1, 2)
         As far as it went; the tip last.
     ending : int
-        One of DONE, JUMP and FULL of `planners.kernels.feeding`.
+        One of DONE, JUMP, FULL and MEETS of `planners.kernels.feeding`.
     place : tuple of two floats
         Where the tip was at the end, in maze units.
     """
@@ -42,7 +54,13 @@ class Feeding:
     place: tuple[float, float]
 
 
-def feed(track: FloatArray, link_length: float, base_pose: FloatArray, step: float = STEP) -> Feeding:
+def feed(
+    track: FloatArray,
+    link_length: float,
+    base_pose: FloatArray,
+    step: float = STEP,
+    walls: FloatArray | None = None,
+) -> Feeding:
     """Feed an arm along a track.
 
     Parameters
@@ -55,23 +73,36 @@ def feed(track: FloatArray, link_length: float, base_pose: FloatArray, step: flo
         Base position and heading.
     step : float
         Largest movement of a joint between poses, in link lengths.
+    walls : array, shape (n_walls, 2, 2), or None
+        Segments, in maze units; if given, feeding ends at the first pose that meets one of them or itself.
+        That is before the first pose if chords that end at points of the track do.
     """
     track, arc = _subdivided(track, link_length)
-    n_links = math.floor(arc[-1] / link_length) + 2
+    sweep = UNCHECKED
+    if walls is not None:
+        free, sweep = sweep_chords(track, arc, link_length, walls)
+        if not free:
+            return Feeding(poses=np.empty((0, 0, 2)), ending=kernel.MEETS, place=(track[0, 0], track[0, 1]))
+    n_links = kernel.links_at_end(track, arc, link_length)
+    if n_links < 0:
+        n_links = math.floor(arc[-1] / link_length) + 2
     room = POSES_PER_LINK * n_links
     while True:
         poses = np.empty((room, n_links + 1, 2))
-        n, ending, x, y = kernel.feed_along(track, arc, link_length, base_pose, step * link_length, poses)
+        n, ending, x, y = kernel.feed_along(
+            track, arc, link_length, base_pose, step * link_length, sweep, poses
+        )
         if ending != kernel.FULL or room >= MOST_POSES_PER_LINK * n_links:
             break
         room = min(4 * room, MOST_POSES_PER_LINK * n_links)
     poses = poses[:n]
+    # Links that never leave the feeder are not needed: those behind the base at the end.
     cos, sin = math.cos(base_pose[2]), math.sin(base_pose[2])
-    # Links that never leave the feeder are not needed.
-    along = (poses[:, :, 0] - base_pose[0]) * cos + (poses[:, :, 1] - base_pose[1]) * sin
-    across = np.abs((poses[:, :, 1] - base_pose[1]) * cos - (poses[:, :, 0] - base_pose[0]) * sin)
-    inside = (along <= 1e-9 * link_length) & (across <= 1e-9 * link_length)
-    unused = int(np.argmin(inside.all(axis=0)[1:]))
+    offset = poses[-1] - base_pose[:2]
+    inside = (offset @ (cos, sin) <= 1e-9 * link_length) & (
+        np.abs(offset @ (-sin, cos)) <= 1e-9 * link_length
+    )
+    unused = int(np.argmin(inside[1:]))
     return Feeding(poses=poses[:, unused:], ending=ending, place=(x, y))
 
 

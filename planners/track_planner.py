@@ -395,12 +395,9 @@ def _finished(track: _Track, scene: Scene, query: Query) -> _Track:
 
 def _free_poses(track: _Track, scene: Scene) -> FloatArray | None:
     """Return the poses along a track if the arm fits it exactly."""
-    fed = feed(scene.unscaled(track.points), scene.length, scene.maze.base_pose)
-    if fed.ending != feeding_kernel.DONE:
-        return None
-    if feeding_kernel.first_hit(fed.poses, scene.maze.base_pose, scene.maze.walls)[0] >= 0:
-        return None
-    return None if feeding_kernel.first_self_crossing(fed.poses, scene.maze.base_pose)[0] >= 0 else fed.poses
+    maze = scene.maze
+    fed = feed(scene.unscaled(track.points), scene.length, maze.base_pose, walls=maze.walls)
+    return fed.poses if fed.ending == feeding_kernel.DONE else None
 
 
 def _solved(poses: FloatArray, scene: Scene, clock: list[float], timings: Mapping[str, float]) -> Candidate:

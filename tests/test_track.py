@@ -13,8 +13,8 @@ from hrsnake_env.arm import ArmSpec
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import clutter_hall, fig19
 from planners import PlanningStatus, plan, validate
-from planners.feeding import motion_along
-from planners.kernels.feeding import first_hit, first_self_crossing
+from planners.feeding import feed, motion_along
+from planners.kernels.feeding import DONE, MEETS, first_hit, first_self_crossing
 from planners.kernels.track import find_chords, find_corners
 from planners.kernels.track_solve import factorise, substitute
 from planners.kernels.track_walls import edges_are_free
@@ -105,6 +105,33 @@ def test_hits_and_self_crossings_are_those_of_shapely(seed):
         crossed = any(links[i].intersects(links[k]) for i in range(7) for k in range(i + 2, 7))
         assert (first_hit(pose[None], base_pose, walls)[0] >= 0) == hit
         assert (first_self_crossing(pose[None], base_pose)[0] >= 0) == crossed
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_feeding_ends_at_the_first_pose_that_meets_a_wall_or_itself(seed):
+    rng = np.random.default_rng(seed)
+    length, base_pose = 100.0, np.array([3.0, -2.0, HEADING])
+    turns = rng.normal(0.0, rng.uniform(0.05, 0.18), 240).cumsum()
+    steps = np.column_stack([np.cos(turns), np.sin(turns)]) / 24.0
+    line = np.concatenate([[(0.0, 0.0), (1.0, 0.0)], (1.0, 0.0) + steps.cumsum(axis=0)])
+    cos, sin = math.cos(HEADING), math.sin(HEADING)
+    track = length * line @ np.array([[cos, sin], [-sin, cos]]) + base_pose[:2]
+    starts = track[rng.integers(30, len(track), 3)] + rng.normal(0.0, 50.0, (3, 2))
+    walls = np.stack([starts, starts + rng.normal(0.0, 30.0, (3, 2))], axis=1)
+    unchecked = feed(track, length, base_pose)
+    for barriers in (walls, walls[:0]):
+        firsts = (
+            first_hit(unchecked.poses, base_pose, barriers)[0],
+            first_self_crossing(unchecked.poses, base_pose)[0],
+        )
+        met = min((pose for pose in firsts if pose >= 0), default=len(unchecked.poses))
+        fed = feed(track, length, base_pose, walls=barriers)
+        if met == len(unchecked.poses) and unchecked.ending == DONE:
+            # A wall may also be met between two poses.
+            assert fed.ending == DONE or len(fed.poses) == 0
+        elif met < len(unchecked.poses):
+            assert fed.ending == MEETS
+            assert len(fed.poses) in (met, 0)
 
 
 def test_the_banded_solver_solves_what_numpy_solves():

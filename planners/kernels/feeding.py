@@ -5,111 +5,82 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from planners.kernels.feeding_sweep import Sweep, directions, start_of_link
+from planners.kernels.track_walls import segments_meet
 from planners.kernels.types import FloatArray, IntArray
 
-DONE, JUMP, FULL = 0, 1, 2
-"""How feeding ends: with the tip at the track's end; where a joint would jump; without room for poses."""
+DONE, JUMP, FULL, MEETS = 0, 1, 2, 3
+"""How feeding ends: with the tip at the track's end; where a joint would jump; without room for poses; at a
+pose that meets a wall or itself."""
 
 SMALLEST = 1e-7
 """Smallest feed of the tip between poses, in link lengths: a joint that still moves too far jumps."""
 
-
-@njit(cache=True)
-def _start_of_link(
-    track: FloatArray, x: float, y: float, length: float, segment: int, share: float
-) -> tuple[int, float, float, float]:
-    """Find the place on the track one link length from (x, y), from an earlier one on: segment, share, place.
-
-    Segment -1 is the axis behind the track, where `share` is the distance from its first point.
-    """
-    k, squared = segment, length * length
-    px, py = track[k, 0], track[k, 1]
-    px += share * (track[k + 1, 0] - px)
-    py += share * (track[k + 1, 1] - py)
-    if (px - x) ** 2 + (py - y) ** 2 >= squared:
-        while (track[k + 1, 0] - x) ** 2 + (track[k + 1, 1] - y) ** 2 >= squared:
-            k += 1
-            if k + 1 > track.shape[0] - 1:
-                return -1, 0.0, 0.0, 0.0
-    else:
-        while (track[k, 0] - x) ** 2 + (track[k, 1] - y) ** 2 < squared:
-            k -= 1
-            if k < 0:
-                return -1, 0.0, 0.0, 0.0
-    ax, ay = track[k, 0] - x, track[k, 1] - y
-    ex, ey = track[k + 1, 0] - track[k, 0], track[k + 1, 1] - track[k, 1]
-    size = ex * ex + ey * ey
-    half = (ax * ex + ay * ey) / size
-    root = max(half * half - (ax * ax + ay * ay - squared) / size, 0.0)
-    t = min(max(-half - np.sqrt(root), 0.0), 1.0)
-    return k, t, track[k, 0] + t * ex, track[k, 1] + t * ey
+RELEASED = 1e-10
+"""How near to the end of the straight part a joint is just there, in link lengths."""
 
 
 @njit(cache=True)
 def _place_arm(
-    track: FloatArray, arc: FloatArray, tip: float, length: float, segment: IntArray, share: FloatArray,
-    new_segment: IntArray, new_share: FloatArray, joints: FloatArray,
+    track: FloatArray, along: FloatArray, arc: FloatArray, tip: float, length: float, segment: IntArray,
+    new_segment: IntArray, place: FloatArray, joints: FloatArray,
 ) -> int:  # fmt: skip
-    """Place the joints, numbered from the tip, with the tip at arclength `tip`; return the last one's number.
+    """Place the joints, the tip last, with the tip at arclength `tip`; return the last one's number.
 
-    That is the first one on the straight part with which the track begins: all behind it are on the axis.
-    Each joint is looked for from its earlier place on. Returns -1 where there is none.
+    Joints are numbered from the tip. The last is the first one on the straight part with which the track
+    begins: all behind it are on the axis. Each joint is looked for from its earlier segment on; `place` is
+    filled with arclengths. Returns -1 where there is none.
     """
+    end, squared = joints.shape[0] - 1, length * length
     k = segment[0]
     while k + 2 < arc.shape[0] and arc[k + 1] < tip:
         k += 1
     while k > 0 and arc[k] > tip:
         k -= 1
-    t = (tip - arc[k]) / (arc[k + 1] - arc[k])
-    new_segment[0], new_share[0] = k, t
-    joints[0, 0] = track[k, 0] + t * (track[k + 1, 0] - track[k, 0])
-    joints[0, 1] = track[k, 1] + t * (track[k + 1, 1] - track[k, 1])
-    n = 0
-    while _arc_of(n, arc, new_segment, new_share) > length * (1.0 + 1e-12):
-        if n + 1 == joints.shape[0]:
+    t = tip - arc[k]
+    x, y = track[k, 0] + t * along[k, 0], track[k, 1] + t * along[k, 1]
+    new_segment[0], place[0], joints[end, 0], joints[end, 1] = k, tip, x, y
+    n, at = 0, tip
+    while at > length * (1.0 + 1e-12):
+        if n == end:
             return -1
-        k, t, x, y = _start_of_link(track, joints[n, 0], joints[n, 1], length, segment[n + 1], share[n + 1])
+        k, t = start_of_link(track, along, x, y, squared, min(segment[n + 1], k), k)
         if k < 0:
             return -1
         n += 1
-        new_segment[n], new_share[n] = k, t
-        joints[n, 0], joints[n, 1] = x, y
+        at = arc[k] + t
+        x, y = track[k, 0] + t * along[k, 0], track[k, 1] + t * along[k, 1]
+        new_segment[n], place[n], joints[end - n, 0], joints[end - n, 1] = k, at, x, y
     return n
-
-
-@njit(cache=True)
-def _arc_of(k: int, arc: FloatArray, segment: IntArray, share: FloatArray) -> float:
-    """Return the arclength at which joint k is placed."""
-    place: float = arc[segment[k]] + share[k] * (arc[segment[k] + 1] - arc[segment[k]])
-    return place
 
 
 @njit(cache=True)
 def _put_behind(n: int, place: float, length: float, base_pose: FloatArray, joints: FloatArray) -> None:
     """Put joint n, at arclength `place` of the straight part, and those behind it on the axis."""
-    cos, sin = np.cos(base_pose[2]), np.sin(base_pose[2])
+    cos, sin, end = np.cos(base_pose[2]), np.sin(base_pose[2]), joints.shape[0] - 1
     for k in range(n, joints.shape[0]):
         along = place - (k - n) * length
-        joints[k, 0] = base_pose[0] + along * cos
-        joints[k, 1] = base_pose[1] + along * sin
+        joints[end - k, 0] = base_pose[0] + along * cos
+        joints[end - k, 1] = base_pose[1] + along * sin
 
 
 @njit(cache=True)
 def _tip_at_release(
-    k: int, tip: float, beyond: float, track: FloatArray, arc: FloatArray, length: float, segment: IntArray,
-    share: FloatArray, new_segment: IntArray, new_share: FloatArray, joints: FloatArray,
+    k: int, tip: float, beyond: float, at_tip: float, at_beyond: float, track: FloatArray, along: FloatArray,
+    arc: FloatArray, length: float, segment: IntArray, new_segment: IntArray, place: FloatArray,
+    joints: FloatArray,
 ) -> float:  # fmt: skip
-    """Find the tip's place, from `tip` to `beyond`, at which joint k is at the end of the straight part."""
-    low, high = tip, beyond
-    g_low = _arc_of(k, arc, segment, share) - length
-    _place_arm(track, arc, high, length, segment, share, new_segment, new_share, joints)
-    g_high = _arc_of(k, arc, new_segment, new_share) - length
+    """Find the tip's place, from `tip` to `beyond`, at which joint k is at the end of the straight part.
+
+    `at_tip` and `at_beyond` are where joint k is at both.
+    """
+    low, high, g_low, g_high = tip, beyond, at_tip - length, at_beyond - length
     at = high
     for _ in range(60):  # regula falsi, with the stale end's value halved (Illinois)
         at = low + (high - low) * g_low / (g_low - g_high)
-        if _place_arm(track, arc, at, length, segment, share, new_segment, new_share, joints) < 0:
+        if _place_arm(track, along, arc, at, length, segment, new_segment, place, joints) < k:
             return beyond
-        g = _arc_of(k, arc, new_segment, new_share) - length
+        g = place[k] - length
         if abs(g) <= 1e-13 * length:
             break
         if (g > 0.0) == (g_high > 0.0):
@@ -120,9 +91,33 @@ def _tip_at_release(
 
 
 @njit(cache=True)
+def _releases(track: FloatArray, along: FloatArray, arc: FloatArray, length: float) -> FloatArray:
+    """Return the tip's places at which a joint comes to the end of the straight part, the track's end last.
+
+    These are link ends in a row from there on. Where the track comes back to a link's start there are more.
+    """
+    n_segments = arc.shape[0] - 1
+    found = np.empty(int(arc[n_segments] / length) + 2)
+    x, y, n, k, t = track[0, 0], track[0, 1], 0, 0, 0.0
+    while True:
+        while k < n_segments and (track[k + 1, 0] - x) ** 2 + (track[k + 1, 1] - y) ** 2 < length * length:
+            k += 1
+        if k == n_segments:
+            found[n] = arc[n_segments]
+            return found[: n + 1]
+        ax, ay = track[k, 0] - x, track[k, 1] - y
+        half = ax * along[k, 0] + ay * along[k, 1]
+        t = -half + np.sqrt(max(half * half - ax * ax - ay * ay + length * length, 0.0))
+        x, y = track[k, 0] + t * along[k, 0], track[k, 1] + t * along[k, 1]
+        found[n] = min(arc[k] + t, arc[n_segments])
+        n += 1
+
+
+@njit(cache=True)
 def feed_along(
-    track: FloatArray, arc: FloatArray, length: float, base_pose: FloatArray, step: float, poses: FloatArray
-) -> tuple[int, int, float, float]:
+    track: FloatArray, arc: FloatArray, length: float, base_pose: FloatArray, step: float, sweep: Sweep,
+    poses: FloatArray,
+) -> tuple[int, int, float, float]:  # fmt: skip
     """Feed an arm along a track, pose by pose; no joint moves farther than `step` between two.
 
     Parameters
@@ -135,13 +130,15 @@ def feed_along(
         In maze units.
     base_pose : array, shape (3,)
         Base position and heading.
+    sweep : Sweep
+        What chords of the track may meet; with empty arrays nothing is looked at.
     poses : array, shape (n_max, n_joints, 2)
         Filled with the joints of each pose, the tip last.
 
     Returns
     -------
     n_poses, ending : int
-        Number of poses, and one of DONE, JUMP and FULL.
+        Number of poses, and one of DONE, JUMP, FULL and MEETS.
     x, y : float
         The tip's place at the end.
 
@@ -150,47 +147,73 @@ def feed_along(
     A pose in which a joint is just at the end of the straight part, so that its link is still straight and
     its other end at the base, is never stepped over: the feeder's rule needs it.
     """
-    n_joints = poses.shape[1]
-    segment, share = np.zeros(n_joints, dtype=np.int64), np.zeros(n_joints)
-    new_segment, new_share = np.zeros(n_joints, dtype=np.int64), np.zeros(n_joints)
-    now, new = np.empty((n_joints, 2)), np.empty((n_joints, 2))
-    total = arc[arc.shape[0] - 1]
-    _put_behind(0, 0.0, length, base_pose, now)
-    poses[0] = now[::-1]
-    placed, tip, stride, n_poses = 0, 0.0, step, 1
+    n_joints, end = poses.shape[1], poses.shape[1] - 1
+    segments, places = np.zeros((2, n_joints), dtype=np.int64), np.zeros((2, n_joints))
+    along = directions(track, arc)
+    releases, next_release = _releases(track, along, arc, length), 0
+    total, checked = arc[arc.shape[0] - 1], sweep.low.shape[0] > 0
+    links = np.empty(n_joints, dtype=np.int64)
+    _put_behind(0, 0.0, length, base_pose, poses[0])
+    placed, tip, stride, n_poses, old = 0, 0.0, step, 1, 0
     while tip < total:
+        now = poses[n_poses - 1]
         if n_poses == poses.shape[0]:
-            return n_poses, FULL, now[0, 0], now[0, 1]
-        at = min(tip + stride, total)
-        n = _place_arm(track, arc, at, length, segment, share, new_segment, new_share, new)
+            return n_poses, FULL, now[end, 0], now[end, 1]
+        new, segment, place = poses[n_poses], segments[old], places[old]
+        new_segment, new_place = segments[1 - old], places[1 - old]
+        while next_release + 1 < releases.shape[0] and releases[next_release] <= tip:
+            next_release += 1
+        at = min(tip + stride, max(releases[next_release], tip + 1e-12 * length))
+        n = _place_arm(track, along, arc, at, length, segment, new_segment, new_place, new)
         least = min(n, placed)
-        if n >= 0 and n != placed and abs(_arc_of(least, arc, segment, share) - length) > 1e-11 * length:
+        if n >= 0 and n != placed and min(
+            abs(place[least] - length), abs(new_place[least] - length)
+        ) > RELEASED * length:  # fmt: skip
             at = _tip_at_release(
-                least, tip, at, track, arc, length, segment, share, new_segment, new_share, new
-            )
-            n = _place_arm(track, arc, at, length, segment, share, new_segment, new_share, new)
+                least, tip, at, place[least], new_place[least], track, along, arc, length, segment,
+                new_segment, new_place, new,
+            )  # fmt: skip
+            n = _place_arm(track, along, arc, at, length, segment, new_segment, new_place, new)
         moved = np.inf
         if n >= 0 and abs(n - placed) <= 1:
-            _put_behind(n, _arc_of(n, arc, new_segment, new_share), length, base_pose, new)
+            _put_behind(n, new_place[n], length, base_pose, new)
             moved = 0.0
-            for k in range(max(n, placed) + 1):
-                moved = max(moved, np.hypot(new[k, 0] - now[k, 0], new[k, 1] - now[k, 1]))
+            for k in range(end - max(n, placed), n_joints):
+                dx, dy = new[k, 0] - now[k, 0], new[k, 1] - now[k, 1]
+                moved = max(moved, dx * dx + dy * dy)
+            moved = np.sqrt(moved)
         if moved > step * (1.0 + 1e-9):
             stride = (at - tip) * min(max(0.9 * step / moved, 0.1), 0.9)
             if stride < SMALLEST * length:
-                return n_poses, JUMP, now[0, 0], now[0, 1]
+                return n_poses, JUMP, now[end, 0], now[end, 1]
             continue
-        stride = min(step, (at - tip) * min(2.0, 0.97 * step / max(moved, 1e-300)), 2.0 * stride)
+        if checked and not _is_free(n, new_segment, new_place, base_pose, sweep, links, poses, n_poses):
+            return n_poses, MEETS, now[end, 0], now[end, 1]
+        wanted = (at - tip) * min(2.0, 0.97 * step / max(moved, 1e-300))
+        # After a short step to a release the stride of before is still right.
+        stride = min(step, max(wanted, stride * min(1.0, 0.97 * step / max(moved, 1e-300))), 2.0 * stride)
         stride = max(stride, 10.0 * SMALLEST * length)
-        for k in range(n + 1):
-            segment[k], share[k] = new_segment[k], new_share[k]
-        for k in range(n + 1, min(placed + 2, n_joints)):
-            segment[k], share[k] = 0, 0.0
-        now[:] = new
-        poses[n_poses] = now[::-1]
-        placed, tip = n, at
+        for k in range(n + 1, min(max(placed, n) + 2, n_joints)):
+            new_segment[k], new_place[k] = 0, 0.0
+        placed, tip, old = n, at, 1 - old
         n_poses += 1
-    return n_poses, DONE, now[0, 0], now[0, 1]
+    now = poses[n_poses - 1]
+    return n_poses, DONE, now[end, 0], now[end, 1]
+
+
+@njit(cache=True)
+def links_at_end(track: FloatArray, arc: FloatArray, length: float) -> int:
+    """Return how many links a tip at the track's end needs, one in the feeder; -1 if it jumps."""
+    along, squared = directions(track, arc), length * length
+    k, at, n = arc.shape[0] - 2, arc[arc.shape[0] - 1], 0
+    x, y = track[k + 1, 0], track[k + 1, 1]
+    while at > length * (1.0 + 1e-12):
+        k, t = start_of_link(track, along, x, y, squared, k, k)
+        if k < 0:
+            return -1
+        n, at = n + 1, arc[k] + t
+        x, y = track[k, 0] + t * along[k, 0], track[k, 1] + t * along[k, 1]
+    return n + 1
 
 
 @njit(cache=True)
@@ -272,3 +295,51 @@ def first_self_crossing(poses: FloatArray, base_pose: FloatArray) -> tuple[int, 
             if behind:
                 break
     return -1, -1, -1
+
+
+@njit(cache=True)
+def _is_free(
+    n: int, segment: IntArray, place: FloatArray, base_pose: FloatArray, sweep: Sweep, links: IntArray,
+    poses: FloatArray, pose: int,
+) -> bool:  # fmt: skip
+    """Tell whether a pose with n links on the track meets neither walls nor itself, as exactly as the above.
+
+    Only what the chords of the track may meet is looked at, unless a link starts where none was known to.
+    The link that comes out of the feeder is not looked at against walls.
+    """
+    end, n_met = poses.shape[1] - 1, 0
+    slack = 1e-9 * place[0]
+    for i in range(n):
+        j = segment[i]
+        if not (sweep.low[j] - slack <= place[i + 1] <= sweep.high[j] + slack):
+            only = poses[pose : pose + 1]
+            return first_hit(only, base_pose, sweep.walls)[0] < 0 and (
+                first_self_crossing(only, base_pose)[0] < 0
+            )
+        for at in range(sweep.first[j], sweep.first[j + 1]):
+            w = sweep.members[at]
+            if segments_meet(
+                poses[pose, end - i - 1, 0], poses[pose, end - i - 1, 1],
+                poses[pose, end - i, 0], poses[pose, end - i, 1],
+                sweep.walls[w, 0, 0], sweep.walls[w, 0, 1], sweep.walls[w, 1, 0], sweep.walls[w, 1, 1],
+            ):  # fmt: skip
+                return False
+        if sweep.crosses[j]:
+            links[n_met] = i
+            n_met += 1
+    if sweep.crosses[0]:
+        links[n_met] = n
+        n_met += 1
+    for p in range(n_met - 1):
+        dx, dy = poses[pose, end - links[p], 0], poses[pose, end - links[p], 1]
+        cx, cy = poses[pose, end - links[p] - 1, 0], poses[pose, end - links[p] - 1, 1]
+        for q in range(p + 1, n_met):
+            if links[q] < links[p] + 2:
+                continue
+            ax, ay = base_pose[0], base_pose[1]
+            if links[q] < n:
+                ax, ay = poses[pose, end - links[q] - 1, 0], poses[pose, end - links[q] - 1, 1]
+            bx, by = poses[pose, end - links[q], 0], poses[pose, end - links[q], 1]
+            if _cross(ax, ay, bx, by, cx, cy, dx, dy):
+                return False
+    return True
