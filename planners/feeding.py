@@ -12,7 +12,7 @@ from planners.kernels.feeding_sweep import Sweep, sweep_chords
 from planners.kernels.types import FloatArray
 from planners.problem import Motion
 
-__all__ = ["Feeding", "motion_along"]
+__all__ = ["Feeding", "feed", "motion_along", "motion_of"]
 
 STEP = 0.03
 """Largest movement of a joint between poses, in link lengths."""
@@ -142,4 +142,13 @@ def motion_along(
     Motion(89 poses, 3 links of 1)
     """
     fed = feed(track, link_length, base_pose, step)
-    return None if fed.ending != kernel.DONE else Motion.from_joints(fed.poses, link_length, base_pose)
+    return None if fed.ending != kernel.DONE else motion_of(fed.poses, link_length, base_pose)
+
+
+def motion_of(poses: FloatArray, link_length: float, base_pose: FloatArray) -> Motion:
+    """Return the motion of poses fed along a track, shape (n_poses, n_links + 1, 2)."""
+    feed, joint_angles = np.empty(len(poses)), np.empty((len(poses), poses.shape[1] - 1))
+    kernel.configurations(poses, link_length, base_pose, feed, joint_angles)
+    return Motion(
+        joints=poses, joint_angles=joint_angles, feed=feed, link_length=link_length, base_pose=base_pose
+    )

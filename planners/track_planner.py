@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planners.feeding import feed
+from planners.feeding import feed, motion_of
 from planners.inset import inset_maze
 from planners.kernels import feeding as feeding_kernel
 from planners.kernels import track as kernel
@@ -401,7 +401,7 @@ def _free_poses(track: _Track, scene: Scene) -> FloatArray | None:
 
 
 def _solved(poses: FloatArray, scene: Scene, clock: list[float], timings: Mapping[str, float]) -> Candidate:
-    motion = Motion.from_joints(poses, scene.length, scene.maze.base_pose)
+    motion = motion_of(poses, scene.length, scene.maze.base_pose)
     clock.append(time.perf_counter())
     stages = dict(zip(("plan", "poses"), np.diff(clock).tolist(), strict=True))
     return Candidate(status=PlanningStatus.SOLVED, motion=motion, timings={**timings, **stages})

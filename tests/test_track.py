@@ -12,7 +12,7 @@ from shapely.geometry import LineString, Point, Polygon, box
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import clutter_hall, fig19
-from planners import PlanningStatus, plan, validate
+from planners import Motion, PlanningStatus, plan, validate
 from planners.feeding import feed, motion_along
 from planners.kernels.feeding import DONE, MEETS, first_hit, first_self_crossing
 from planners.kernels.track import find_chords, find_corners
@@ -107,13 +107,25 @@ def test_hits_and_self_crossings_are_those_of_shapely(seed):
         assert (first_self_crossing(pose[None], base_pose)[0] >= 0) == crossed
 
 
+@given(amplitude=st.floats(0.0, 0.5), degrees=st.floats(-360.0, 360.0))
+@settings(max_examples=20)
+def test_configurations_along_a_track_are_those_of_its_joints(amplitude, degrees):
+    angle = math.radians(degrees)
+    turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+    base_pose = np.array([*((3.0, -2.0) @ turn), HEADING + angle])
+    motion = motion_along(wavy_track(1.0, amplitude) @ turn, 1.0, base_pose)
+    other = Motion.from_joints(motion.joints, 1.0, base_pose)
+    np.testing.assert_allclose(motion.feed, other.feed, atol=1e-12)
+    np.testing.assert_allclose(motion.joint_angles, other.joint_angles, atol=1e-9)
+
+
 @pytest.mark.parametrize("seed", range(40))
 def test_feeding_ends_at_the_first_pose_that_meets_a_wall_or_itself(seed):
     rng = np.random.default_rng(seed)
     length, base_pose = 100.0, np.array([3.0, -2.0, HEADING])
     turns = rng.normal(0.0, rng.uniform(0.05, 0.18), 240).cumsum()
     steps = np.column_stack([np.cos(turns), np.sin(turns)]) / 24.0
-    line = np.concatenate([[(0.0, 0.0), (1.0, 0.0)], (1.0, 0.0) + steps.cumsum(axis=0)])
+    line = np.concatenate([[(0.0, 0.0), (1.0, 0.0)], steps.cumsum(axis=0) + (1.0, 0.0)])
     cos, sin = math.cos(HEADING), math.sin(HEADING)
     track = length * line @ np.array([[cos, sin], [-sin, cos]]) + base_pose[:2]
     starts = track[rng.integers(30, len(track), 3)] + rng.normal(0.0, 50.0, (3, 2))

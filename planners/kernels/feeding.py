@@ -217,6 +217,39 @@ def links_at_end(track: FloatArray, arc: FloatArray, length: float) -> int:
 
 
 @njit(cache=True)
+def configurations(
+    poses: FloatArray, length: float, base_pose: FloatArray, feed: FloatArray, joint_angles: FloatArray
+) -> None:
+    """Fill the feed, shape (n_poses,), and the joint angles, shape (n_poses, n_links), of poses fed along.
+
+    Angles are in rad and unwrapped: none changes by more than a half turn from pose to pose. Links that are
+    still in the feeder have exactly none.
+    """
+    cos, sin = np.cos(base_pose[2]), np.sin(base_pose[2])
+    n_links = joint_angles.shape[1]
+    for p in range(poses.shape[0]):
+        rear = (poses[p, 0, 0] - base_pose[0]) * cos + (poses[p, 0, 1] - base_pose[1]) * sin
+        feed[p] = rear + n_links * length
+        n_inside = min(max(int(np.floor(-rear / length + 1e-9)), 0), n_links)
+        joint_angles[p, :n_inside] = 0.0
+        ux, uy = length * cos, length * sin
+        for k in range(n_inside, n_links):
+            vx, vy = poses[p, k + 1, 0] - poses[p, k, 0], poses[p, k + 1, 1] - poses[p, k, 1]
+            cross, dot = ux * vy - uy * vx, ux * vx + uy * vy
+            if abs(cross) < 0.01 * dot:
+                # The series is exact to rounding, and most links follow nearly straight.
+                r = cross / dot
+                s = r * r
+                angle = r * (1.0 - s * (1.0 / 3.0 - s * (0.2 - s * (1.0 / 7.0 - s / 9.0))))
+            else:
+                angle = np.arctan2(cross, dot)
+            if p > 0 and abs(angle - joint_angles[p - 1, k]) > np.pi:
+                angle += 2.0 * np.pi * np.round((joint_angles[p - 1, k] - angle) / (2.0 * np.pi))
+            joint_angles[p, k] = angle
+            ux, uy = vx, vy
+
+
+@njit(cache=True)
 def _cross(ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float) -> bool:
     """Tell whether two segments cross; mere touching is not crossing."""
     ex, ey, fx, fy = bx - ax, by - ay, dx - cx, dy - cy
