@@ -23,7 +23,8 @@ from hrsnake_env.rendering import COLOURS
 from planners.corners import critical_corners
 from planners.kernels.rod import free_directions
 from planners.survey import survey
-from planners.sweep_planner import FINENESSES, MAX_INNER_BEAM, MIN_CURVATURE, VARIANTS, Track, aim_line, grow
+from planners.sweep_planner import FINENESSES, MAX_INNER_BEAM, MIN_CURVATURE, VARIANTS
+from planners.sweep_track import Track, aim_line, grow
 
 IMAGES = Path(__file__).parent / "images"
 LINK_LENGTH = 430.0

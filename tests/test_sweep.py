@@ -11,7 +11,8 @@ from planners.corners import critical_corners
 from planners.kernels.sweep import FASTEST
 from planners.query import Query
 from planners.survey import survey
-from planners.sweep_planner import FINENESSES, MIN_CURVATURE, VARIANTS, aim_line, grow, plan_sweep
+from planners.sweep_planner import FINENESSES, MIN_CURVATURE, VARIANTS, plan_sweep
+from planners.sweep_track import aim_line, grow
 
 FINENESS = FINENESSES[1]
 
