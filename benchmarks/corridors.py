@@ -1,4 +1,4 @@
-"""How close to the longest rod the longest link comes that the sweep brings through 100 random corridors.
+"""How close to the longest rod the longest link comes that passes through 100 random corridors.
 
 Run with `.venv/bin/python benchmarks/corridors.py [seconds per length]` from the repository's root. Goes on
 from `benchmarks/results/corridors.jsonl` where an earlier run was stopped.
@@ -15,7 +15,7 @@ from planners.bench.mazes import longest_in_maze, warm_up
 from planners.bench.pool import resumed
 
 SEEDS = range(100)
-PLANNER, TIME_BUDGET = "sweep", 3.0
+PLANNER, TIME_BUDGET = "auto", 0.7
 RESULTS = Path(__file__).parent / "results"
 LOW = 0.95
 

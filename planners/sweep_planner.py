@@ -272,7 +272,11 @@ def _failed(query: Query, geometry: Geometry, track: Track | None, timings: dict
     every = max(1, (drawn.stop - drawn.start) // max(beyond - track.index, 1))
     starts = np.concatenate([track.points[drawn][::every], track.aim[track.index : beyond]])
     deepest = least_depth(geometry.maze, starts, heading, float(along[beyond]) - heading, length)
-    what = ""
+    if deepest is None:  # in a bend to and fro it is the turn between that is hard
+        between = along[track.index : beyond + 1]
+        farthest = float(between[np.argmax(np.abs(between - heading))])
+        deepest = least_depth(geometry.maze, starts, heading, farthest - heading, length)
+    what = " A single link could turn there; the track must be free for those that follow on it, too."
     if deepest is not None:
         depth, (x_wall, y_wall) = deepest
         what = (
