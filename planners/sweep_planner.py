@@ -272,7 +272,7 @@ def _failed(query: Query, geometry: Geometry, track: Track | None, timings: dict
     every = max(1, (drawn.stop - drawn.start) // max(beyond - track.index, 1))
     starts = np.concatenate([track.points[drawn][::every], track.aim[track.index : beyond]])
     deepest = least_depth(geometry.maze, starts, heading, float(along[beyond]) - heading, length)
-    if deepest is None:  # in a bend to and fro it is the turn between that is hard
+    if deepest is None:  # in an S-bend it is the turn in its middle that is hard
         between = along[track.index : beyond + 1]
         farthest = float(between[np.argmax(np.abs(between - heading))])
         deepest = least_depth(geometry.maze, starts, heading, farthest - heading, length)
