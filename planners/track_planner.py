@@ -37,8 +37,12 @@ __all__ = ["plan_track"]
 COARSE = (12, 24, 48)
 """Samples per link length while the chords grow: the first that keep the track from cutting corners."""
 
-FINE = ((24, 1.0), (48, 1.0), (48, 4.0), (96, 4.0), (96, 16.0))
+FINE = ((24, 1.0), (24, 4.0), (48, 1.0), (48, 4.0), (96, 4.0), (96, 16.0))
 """Samples per link length, and margins in units of the usual one, tried until the exact poses are free."""
+
+ASIDE, ASIDE_STEPS = (24, 4.0), 6
+"""Of those, one that costs little where there is room, and its steps. Where there is none it leads astray:
+the next begins where it began."""
 
 MARGIN = 0.3
 """Kept from the walls, over the square of the samples per link: what a track bends between two samples."""
@@ -377,19 +381,28 @@ def _finished(track: _Track, scene: Scene, query: Query) -> _Track:
         if per_link < track.per_link:
             continue
         query.tell("plan", 0.5 + 0.5 * number / len(FINE))
-        points = with_axis(track.points[track.per_link :], per_link)
-        weights = replace(FINE_WEIGHTS, margin=margin)
-        track = _measured(points, per_link, 1.0, scene, weights)
-        for _ in range(MOST_STEPS):
-            if track.good or track.slips or query.late:
-                break
-            track = _moved(track, scene, weights)
+        aside, weights = (per_link, margin) == ASIDE, replace(FINE_WEIGHTS, margin=margin)
+        settled = _settled(track, per_link, scene, weights, query, ASIDE_STEPS if aside else MOST_STEPS)
+        if settled.lacking[kernel.CORNER, 0] <= 0.0 and not (settled.slips or query.late):
+            poses = _free_poses(settled, scene)
+            if poses is not None:
+                return replace(settled, poses=poses)
+        if not aside:
+            track = settled
         if track.slips or query.late:
             break
-        if track.lacking[kernel.CORNER, 0] <= 0.0:
-            poses = _free_poses(track, scene)
-            if poses is not None:
-                return replace(track, poses=poses)
+    return track
+
+
+def _settled(
+    track: _Track, per_link: int, scene: Scene, weights: _Weights, query: Query, most_steps: int
+) -> _Track:
+    """Sample a track again and move it until it is good, for some steps at most."""
+    track = _measured(with_axis(track.points[track.per_link :], per_link), per_link, 1.0, scene, weights)
+    for _ in range(most_steps):
+        if track.good or track.slips or query.late:
+            break
+        track = _moved(track, scene, weights)
     return track
 
 

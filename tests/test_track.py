@@ -125,8 +125,7 @@ def test_feeding_ends_at_the_first_pose_that_meets_a_wall_or_itself(seed):
     length, base_pose = 100.0, np.array([3.0, -2.0, HEADING])
     turns = rng.normal(0.0, rng.uniform(0.05, 0.18), 240).cumsum()
     steps = np.column_stack([np.cos(turns), np.sin(turns)]) / 24.0
-    beyond = steps.cumsum(axis=0) + (1.0, 0.0)
-    line = np.concatenate([[(0.0, 0.0), (1.0, 0.0)], beyond])
+    line = np.concatenate([[(0.0, 0.0)], np.concatenate([[(1.0, 0.0)], steps]).cumsum(axis=0)])
     cos, sin = math.cos(HEADING), math.sin(HEADING)
     track = length * line @ np.array([[cos, sin], [-sin, cos]]) + base_pose[:2]
     starts = track[rng.integers(30, len(track), 3)] + rng.normal(0.0, 50.0, (3, 2))
