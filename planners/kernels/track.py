@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from planners.kernels.track_types import Chords, Rows, Surroundings
-from planners.kernels.track_walls import REACH, add_row
+from planners.kernels.track_walls import REACH, add_row, longest_edge
 from planners.kernels.types import FloatArray, IntArray
 
 CORNER, SLOPE, ANGLE, PLACE = 0, 1, 2, 3
@@ -98,7 +98,7 @@ def find_chords(points: FloatArray, per_link: int, chord: float, chords: Chords)
     return c, n
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _on(points: FloatArray, k: int, f: float) -> tuple[float, float]:
     """Return the place at share f of segment k."""
     x = points[k, 0] + f * (points[k + 1, 0] - points[k, 0])
@@ -106,7 +106,7 @@ def _on(points: FloatArray, k: int, f: float) -> tuple[float, float]:
     return x, y
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _crossing(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> int:
     """Count the crossing of a step from a to b with the ray from (x, y) along x: +1 upward, -1 downward."""
     if (ay <= y) == (by <= y):
@@ -132,18 +132,27 @@ def find_corners(
     `chords.depth` and `chords.place` are filled; `passed`, shape (n,), is work space.
     """
     chords.depth[:n_chords] = -np.inf
+    longest, widest = longest_edge(points, per_link), 0
+    for c in range(n_chords):
+        widest = max(widest, chords.end[c] + 1 - chords.segment[c])
+    farthest = LONGEST_STRETCH * widest / per_link + REACH
     for number in range(near.corners.shape[0]):
         x, y = near.corners[number, 0], near.corners[number, 1]
-        passed[0] = 0
-        for i in range(1, points.shape[0]):
-            passed[i] = passed[i - 1] + _crossing(
-                points[i - 1, 0], points[i - 1, 1], points[i, 0], points[i, 1], x, y
-            )
-        for c in range(n_chords):
+        # Crossings are counted from sample `begin` to sample `done`, where chords are near.
+        begin, done, c = 0, -1, -1
+        while c + 1 < n_chords:
+            c += 1
             j, k = chords.end[c], chords.segment[c]
             # No part of the loop is farther from its end than the stretch is long.
             far = LONGEST_STRETCH * (j + 1 - k) / per_link + REACH
-            if (x - points[j, 0]) ** 2 + (y - points[j, 1]) ** 2 > far * far:
+            squared = (x - points[j, 0]) ** 2 + (y - points[j, 1]) ** 2
+            if squared > far * far:
+                skipped = int((np.sqrt(squared) - farthest) / longest) if squared > farthest * farthest else 0
+                if skipped > 1:
+                    # The end of no chord in between comes near enough.
+                    if j + skipped >= points.shape[0]:
+                        break
+                    c = chords.of_sample[j + skipped]
                 continue
             ax, ay = _on(points, k, chords.share[c])
             bx, by = _on(points, j, chords.end_share[c])
@@ -152,6 +161,14 @@ def find_corners(
             across = ux * (y - ay) - uy * (x - ax)
             if abs(across) > 2.0 or along < -0.5 or along > 1.5:
                 continue
+            if k < begin or k > done:
+                begin, done = k, k
+                passed[k] = 0
+            for i in range(done + 1, j + 1):
+                passed[i] = passed[i - 1] + _crossing(
+                    points[i - 1, 0], points[i - 1, 1], points[i, 0], points[i, 1], x, y
+                )
+            done = max(done, j)
             turns = passed[j] - passed[k + 1] + _crossing(bx, by, ax, ay, x, y)
             turns += _crossing(ax, ay, points[k + 1, 0], points[k + 1, 1], x, y)
             turns += _crossing(points[j, 0], points[j, 1], bx, by, x, y)
@@ -211,7 +228,13 @@ def chord_rows(
                 n = _corner_row(c, side, ux, uy, points, chords, deep + margin, n, rows)
                 if deep > worst[CORNER, 0]:
                     worst[CORNER, 0], worst[CORNER, 1] = deep, c
-        n = _slope_row(c, ux, uy, points, per_link, chord, chords, least_slope, n, rows, worst)
+        k, before = chords.segment[c], chords.segment[max(c - 1, 0)]
+        first, last = max(min(before, k), per_link - 1), min(max(before, k) + 1, chords.end[c])
+        steep, slope = _steepest(points, ux, uy, k, first, last)
+        if least_slope - slope > worst[SLOPE, 0]:
+            worst[SLOPE, 0], worst[SLOPE, 1] = least_slope - slope, c
+        if slope <= least_slope + NEAR:
+            n = _slope_row(c, ux, uy, points, chord, chords, steep, least_slope - slope, n, rows)
         if joint_limit < np.pi:
             n = _joint_row(c, ux, uy, points, per_link, chord, chords, joint_limit, n, rows, worst)
     return n
@@ -257,36 +280,42 @@ def _corner_row(
     return add_row(n, wanted, 1.0, rows)
 
 
+@njit(cache=True, inline="always")
+def _steepest(
+    points: FloatArray, ux: float, uy: float, steep: int, first: int, last: int
+) -> tuple[int, float]:
+    """Find the segment, from `first` to `last`, that turns farthest from a unit vector, and its slope.
+
+    Where there is none, `steep` is returned.
+    """
+    least = np.inf
+    for i in range(first, last + 1):
+        ex, ey = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
+        slope = (ux * ex + uy * ey) / np.sqrt(ex * ex + ey * ey)
+        if slope < least:
+            steep, least = i, slope
+    return steep, least
+
+
 @njit(cache=True)
 def _slope_row(
     c: int,
     ux: float,
     uy: float,
     points: FloatArray,
-    per_link: int,
     chord: float,
     chords: Chords,
-    least_slope: float,
+    steep: int,
+    wanted: float,
     n: int,
     rows: Rows,
-    worst: FloatArray,
 ) -> int:
     """Write that the track where chord c starts does not turn too far from the chord.
 
     Where the start moves over several segments the steepest counts. The slope changes with the turn of the
     chord and with that of the segment.
     """
-    k, before = chords.segment[c], chords.segment[max(c - 1, 0)]
-    steep, least = k, np.inf
-    for i in range(max(min(before, k), per_link - 1), min(max(before, k) + 2, chords.end[c] + 1)):
-        ex, ey = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
-        slope = (ux * ex + uy * ey) / np.sqrt(ex * ex + ey * ey)
-        if slope < least:
-            steep, least = i, slope
-    if least_slope - least > worst[SLOPE, 0]:
-        worst[SLOPE, 0], worst[SLOPE, 1] = least_slope - least, c
-    if least > least_slope + NEAR:
-        return n
+    k = chords.segment[c]
     ex, ey = points[steep + 1, 0] - points[steep, 0], points[steep + 1, 1] - points[steep, 1]
     size = np.sqrt(ex * ex + ey * ey)
     tx, ty = ex / size, ey / size
@@ -297,7 +326,7 @@ def _slope_row(
     rows.samples[n, 4], rows.samples[n, 5] = steep, steep + 1
     rows.factor[n, 4, 0], rows.factor[n, 4, 1] = swing * ty, -swing * tx
     rows.factor[n, 5, 0], rows.factor[n, 5, 1] = -swing * ty, swing * tx
-    return add_row(n, least_slope - least, SLOPE_WEIGHT, rows)
+    return add_row(n, wanted, SLOPE_WEIGHT, rows)
 
 
 @njit(cache=True)

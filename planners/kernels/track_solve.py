@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from planners.kernels.track_types import ROW_WIDTH, Rows
-from planners.kernels.types import FloatArray, IntArray
+from planners.kernels.types import BoolArray, FloatArray, IntArray
 
 PASSES = 3
 """How often the rows that count are chosen: first those violated now, then those the movement violates."""
@@ -78,30 +78,68 @@ def substitute(band: FloatArray, low: IntArray, x: FloatArray) -> None:
 
 
 @njit(cache=True)
-def _add_penalty(
-    index: IntArray,
-    slope: FloatArray,
-    wanted: float,
-    weight: float,
-    band: FloatArray,
-    low: IntArray,
+def _add_bending(
+    points: FloatArray, normals: FloatArray, fixed: int, smooth: float, stiff: float, band: FloatArray,
     right: FloatArray,
-) -> None:
-    """Add weight (slope . x - wanted)^2 / 2 to the banded system; entries of `index` below 0 do not count."""
-    w, least = band.shape[1] - 1, band.shape[0]
-    for q in range(index.shape[0]):
-        if index[q] >= 0:
-            least = min(least, index[q])
-    for q in range(index.shape[0]):
-        i = index[q]
-        if i < 0:
+) -> None:  # fmt: skip
+    """Add the bending of the track after the movement, and of the movement, to the banded system."""
+    w, n, spacing = band.shape[1] - 1, points.shape[0], 1.0 / (fixed - 1)
+    smooth, stiff = smooth / spacing**3, stiff / spacing**3
+    for i in range(fixed - 1, n - 1):
+        bent_x = points[i - 1, 0] - 2.0 * points[i, 0] + points[i + 1, 0]
+        bent_y = points[i - 1, 1] - 2.0 * points[i, 1] + points[i + 1, 1]
+        for q in range(3):
+            r, a = i + q - 1 - fixed, -2.0 if q == 1 else 1.0
+            if r < 0:
+                continue
+            x, y = normals[r + fixed, 0], normals[r + fixed, 1]
+            right[r] -= smooth * a * (x * bent_x + y * bent_y)
+            for p in range(max(0, q - r), q + 1):
+                b = -2.0 if p == 1 else 1.0
+                turn = x * normals[r + fixed - q + p, 0] + y * normals[r + fixed - q + p, 1]
+                band[r, w - q + p] += a * b * (stiff + smooth * turn)
+
+
+@njit(cache=True)
+def _add_rows(
+    samples: IntArray, slope: FloatArray, wanted: FloatArray, weight: FloatArray, counts: BoolArray,
+    spacing: float, band: FloatArray, low: IntArray, right: FloatArray,
+) -> None:  # fmt: skip
+    """Add weight (slope . x - wanted)^2 / 2 of the rows that count to the banded system."""
+    w = band.shape[1] - 1
+    for r in range(counts.shape[0]):
+        if not counts[r]:
             continue
-        low[i] = min(low[i], least)
-        right[i] += weight * wanted * slope[q]
-        for p in range(index.shape[0]):
-            k = index[p]
-            if 0 <= k <= i:
-                band[i, k - i + w] += weight * slope[q] * slope[p]
+        least, heavy = band.shape[0], weight[r] * spacing
+        for q in range(ROW_WIDTH):
+            if samples[r, q] >= 0:
+                least = min(least, samples[r, q])
+        for q in range(ROW_WIDTH):
+            i = samples[r, q]
+            if i < 0:
+                continue
+            low[i] = min(low[i], least)
+            right[i] += heavy * wanted[r] * slope[r, q]
+            for p in range(ROW_WIDTH):
+                k = samples[r, p]
+                if 0 <= k <= i:
+                    band[i, k - i + w] += heavy * slope[r, q] * slope[r, p]
+
+
+@njit(cache=True)
+def _choose_rows(
+    samples: IntArray, slope: FloatArray, wanted: FloatArray, move: FloatArray, counts: BoolArray
+) -> bool:
+    """Choose the rows that a movement violates; tell whether they are others than before."""
+    changed = False
+    for r in range(counts.shape[0]):
+        left = wanted[r]
+        for q in range(ROW_WIDTH):
+            if samples[r, q] >= 0:
+                left -= slope[r, q] * move[samples[r, q]]
+        changed |= counts[r] != (left > 0.0)
+        counts[r] = left > 0.0
+    return changed
 
 
 @njit(cache=True)
@@ -136,32 +174,22 @@ def solve_rows(
     move : array, shape (n - fixed,)
         Filled.
     """
-    w, n, spacing = band.shape[1] - 1, points.shape[0], 1.0 / (fixed - 1)
-    bend = np.array([1.0, -2.0, 1.0])
-    index, slope = np.empty(3, dtype=np.int64), np.empty(3)
+    w, n, spacing = band.shape[1] - 1, points.shape[0] - fixed, 1.0 / (fixed - 1)
+    counts = np.zeros(n_rows, dtype=np.bool_)
+    bending, bent = np.zeros((n, 3)), np.zeros(n)
+    bending[:, 2] = tether * spacing
+    _add_bending(points, normals, fixed, smooth, stiff, bending, bent)
     move[:] = 0.0
-    for _ in range(PASSES):
-        band[:], right[:] = 0.0, 0.0
-        for i in range(n - fixed):
-            band[i, w] = tether * spacing
+    for number in range(PASSES):
+        changed = _choose_rows(rows.samples, rows.slope, rows.wanted, move, counts)
+        if number > 0 and not changed:
+            return
+        for i in range(n):
             low[i] = max(0, i - 2)
-        for r in range(n_rows):
-            left = rows.wanted[r]
-            for q in range(ROW_WIDTH):
-                if rows.samples[r, q] >= 0:
-                    left -= rows.slope[r, q] * move[rows.samples[r, q]]
-            if left > 0.0:
-                weight = rows.weight[r] * spacing
-                _add_penalty(rows.samples[r], rows.slope[r], rows.wanted[r], weight, band, low, right)
-        for i in range(fixed - 1, n - 1):
-            for q in range(3):
-                index[q] = i + q - 1 - fixed
-            _add_penalty(index, bend, 0.0, stiff / spacing**3, band, low, right)
-            for a in range(2):
-                for q in range(3):
-                    slope[q] = bend[q] * normals[i + q - 1, a]
-                bent = points[i - 1, a] - 2.0 * points[i, a] + points[i + 1, a]
-                _add_penalty(index, slope, -bent, smooth / spacing**3, band, low, right)
+            right[i] = bent[i]
+            band[i, : w - 2] = 0.0
+            band[i, w - 2], band[i, w - 1], band[i, w] = bending[i, 0], bending[i, 1], bending[i, 2]
+        _add_rows(rows.samples, rows.slope, rows.wanted, rows.weight, counts, spacing, band, low, right)
         factorise(band, low)
         move[:] = right
         substitute(band, low, move)

@@ -80,22 +80,24 @@ def list_walls(
     return int(first[nx * ny])
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _cell_of(x: float, y: float, near: Surroundings) -> int:
     ix = min(max(int((x - near.origin[0]) / near.cell), 0), near.nx - 1)
     iy = min(max(int((y - near.origin[1]) / near.cell), 0), near.ny - 1)
     return iy * near.nx + ix
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _meets_near(ax: float, ay: float, bx: float, by: float, near: Surroundings) -> bool:
     """Tell whether the segment a-b, no longer than the reach, meets a wall."""
     cell = _cell_of(ax, ay, near)
+    meets, walls = False, near.walls
     for at in range(near.first[cell], near.first[cell + 1]):
-        wall = near.walls[near.members[at]]
-        if segments_meet(ax, ay, bx, by, wall[0, 0], wall[0, 1], wall[1, 0], wall[1, 1]):
-            return True
-    return False
+        w = near.members[at]
+        if segments_meet(ax, ay, bx, by, walls[w, 0, 0], walls[w, 0, 1], walls[w, 1, 0], walls[w, 1, 1]):
+            meets = True
+            break
+    return meets
 
 
 @njit(cache=True)
@@ -108,12 +110,12 @@ def edges_are_free(points: FloatArray, first: int, near: Surroundings) -> bool:
 
 
 @njit(cache=True)
-def _from_wall(x: float, y: float, wall: FloatArray) -> tuple[float, float]:
-    """Return the vector from the nearest point of a wall, shape (2, 2), to (x, y)."""
-    ex, ey = wall[1, 0] - wall[0, 0], wall[1, 1] - wall[0, 1]
-    t = ((x - wall[0, 0]) * ex + (y - wall[0, 1]) * ey) / (ex * ex + ey * ey)
+def _from_wall(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> tuple[float, float]:
+    """Return the vector from the nearest point of a wall a-b to (x, y)."""
+    ex, ey = bx - ax, by - ay
+    t = ((x - ax) * ex + (y - ay) * ey) / (ex * ex + ey * ey)
     t = min(max(t, 0.0), 1.0)
-    return x - wall[0, 0] - t * ex, y - wall[0, 1] - t * ey
+    return x - ax - t * ex, y - ay - t * ey
 
 
 @njit(cache=True)
@@ -127,6 +129,7 @@ def add_row(n: int, wanted: float, weight: float, rows: Rows) -> int:
 @njit(cache=True)
 def sample_rows(points: FloatArray, fixed: int, near: Surroundings, margin: float, n: int, rows: Rows) -> int:
     """Write as rows that each sample from `fixed` on keeps a margin from the nearest wall on both sides."""
+    walls = near.walls
     for i in range(fixed, points.shape[0]):
         x, y = points[i, 0], points[i, 1]
         cell = _cell_of(x, y, near)
@@ -134,7 +137,8 @@ def sample_rows(points: FloatArray, fixed: int, near: Surroundings, margin: floa
         for _ in range(2):
             best, bx, by = REACH * REACH, 0.0, 0.0
             for at in range(near.first[cell], near.first[cell + 1]):
-                dx, dy = _from_wall(x, y, near.walls[near.members[at]])
+                w = near.members[at]
+                dx, dy = _from_wall(x, y, walls[w, 0, 0], walls[w, 0, 1], walls[w, 1, 0], walls[w, 1, 1])
                 if dx * dx + dy * dy < best and dx * ox + dy * oy <= 0.0:
                     best, bx, by = dx * dx + dy * dy, dx, dy
             if bx == 0.0 and by == 0.0:
@@ -149,13 +153,28 @@ def sample_rows(points: FloatArray, fixed: int, near: Surroundings, margin: floa
 
 
 @njit(cache=True)
+def longest_edge(points: FloatArray, first: int) -> float:
+    """Return a little more than the longest distance between two samples in a row, from a sample on."""
+    longest = 1e-9
+    for i in range(first, points.shape[0] - 1):
+        ex, ey = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
+        longest = max(longest, ex * ex + ey * ey)
+    return float(1.001 * np.sqrt(longest))
+
+
+@njit(cache=True)
 def edge_rows(points: FloatArray, fixed: int, near: Surroundings, margin: float, n: int, rows: Rows) -> int:
     """Write as rows that the track between two samples does not cut a corner."""
+    longest = longest_edge(points, fixed - 1)
     for c in range(near.corners.shape[0]):
         x, y = near.corners[c, 0], near.corners[c, 1]
-        for i in range(fixed - 1, points.shape[0] - 1):
+        i = fixed - 2
+        while i + 2 < points.shape[0]:
+            i += 1
             ax, ay = x - points[i, 0], y - points[i, 1]
             if abs(ax) > REACH or abs(ay) > REACH:
+                # Samples are no farther apart than `longest`: those that cannot be near yet are left out.
+                i += max(int((max(abs(ax), abs(ay)) - REACH) / longest) - 1, 0)
                 continue
             ex, ey = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
             squared = ex * ex + ey * ey
