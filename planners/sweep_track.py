@@ -194,7 +194,7 @@ def grow(
     )
     resumed = 0 if earlier is None else _common(track, earlier, path.s, length)
     n, ending = resumed, kernel.PAUSED
-    while ending == kernel.PAUSED and time.perf_counter() < deadline:
+    while ending == kernel.PAUSED and (n == resumed or time.perf_counter() < deadline):
         n, ending = kernel.grow_track(
             length,
             math.inf if arm.joint_limit is None else float(arm.joint_limit),

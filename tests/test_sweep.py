@@ -6,7 +6,7 @@ import pytest
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import fig19
-from planners import PlanningStatus, plan
+from planners import PlanningStatus, plan, sweep_track
 from planners.corners import critical_corners
 from planners.kernels.sweep import FASTEST
 from planners.query import Query
@@ -97,3 +97,33 @@ def test_round_bends_of_many_short_walls_are_passed():
     maze = Maze.from_corridors(np.vstack([[(-300.0, -900.0)], bend, [(300.0, -900.0)]]), 150.0)
     result = plan(maze, ArmSpec(link_length=350.0), planner="sweep")
     assert result.solved, result.reason
+
+
+def test_a_deadline_that_has_passed_ends_planning():
+    query = Query(maze=Maze.load("S200"), arm=ArmSpec(link_length=430.0), deadline=0.0)
+    candidate = plan_sweep(query)
+    assert candidate.status is PlanningStatus.OUT_OF_TIME and candidate.motion is None
+    assert candidate.failure.path_position > 0.0
+
+
+def test_a_track_drawn_in_pieces_is_the_same(monkeypatch):
+    whole = track_of(Maze.load("serp"), 300.0)
+    monkeypatch.setattr(sweep_track, "CHUNK", 500)
+    pieces = track_of(Maze.load("serp"), 300.0)
+    assert pieces.reached and pieces.n == whole.n
+    np.testing.assert_array_equal(pieces.points[: pieces.n], whole.points[: whole.n])
+
+
+def test_a_track_goes_on_from_where_its_aim_differs():
+    maze, length = Maze.load("serp"), 430.0
+    geometry = survey(maze)
+    corners = critical_corners(geometry.path, geometry.beams, MIN_CURVATURE)
+    ways = [VARIANTS[0]] * len(corners)
+    other = [*ways[:-1], VARIANTS[1]]
+    arm = ArmSpec(link_length=length)
+    first, second = (aim_line(geometry, corners, way, length) for way in (ways, other))
+    earlier = grow(geometry, arm, FINENESS, first)
+    resumed, fresh = grow(geometry, arm, FINENESS, second, earlier), grow(geometry, arm, FINENESS, second)
+    assert resumed.resumed > 0.2 * earlier.n
+    assert resumed.n == fresh.n
+    np.testing.assert_array_equal(resumed.points[: fresh.n], fresh.points[: fresh.n])
