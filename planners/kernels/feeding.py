@@ -173,6 +173,8 @@ def feed_along(
                 least, tip, at, place[least], new_place[least], track, along, arc, length, segment,
                 new_segment, new_place, new,
             )  # fmt: skip
+            if at <= tip + 1e-12 * length:  # the joint comes out of the straight part with a jump
+                return n_poses, JUMP, now[end, 0], now[end, 1]
             n = _place_arm(track, along, arc, at, length, segment, new_segment, new_place, new)
         moved = np.inf
         if n >= 0 and abs(n - placed) <= 1:
