@@ -123,7 +123,7 @@ def test_configurations_along_a_track_are_those_of_its_joints(amplitude, degrees
 def test_feeding_ends_at_the_first_pose_that_meets_a_wall_or_itself(seed):
     rng = np.random.default_rng(seed)
     length, base_pose = 100.0, np.array([3.0, -2.0, HEADING])
-    turns = rng.normal(0.0, rng.uniform(0.05, 0.18), 240).cumsum()
+    turns = (rng.normal(0.0, 0.1, 240) + rng.choice([-1.0, 0.0, 1.0]) * rng.uniform(0.01, 0.05)).cumsum()
     steps = np.column_stack([np.cos(turns), np.sin(turns)]) / 24.0
     line = np.concatenate([[(0.0, 0.0)], np.concatenate([[(1.0, 0.0)], steps]).cumsum(axis=0)])
     cos, sin = math.cos(HEADING), math.sin(HEADING)
