@@ -15,7 +15,7 @@ from planners.bench.mazes import longest_in_maze, warm_up
 from planners.bench.pool import resumed
 
 SEEDS = range(100)
-PLANNER, TIME_BUDGET = "auto", 0.7
+PLANNER, TIME_BUDGET = "auto", 1.0
 RESULTS = Path(__file__).parent / "results"
 LOW = 0.95
 
