@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from planners.kernels.track_types import Chords, Rows, Surroundings
-from planners.kernels.track_walls import REACH, add_row, longest_edge
+from planners.kernels.track_walls import REACH, add_row
 from planners.kernels.types import FloatArray, IntArray
 
 CORNER, SLOPE, ANGLE, PLACE = 0, 1, 2, 3
@@ -30,8 +30,8 @@ SLOPE_WEIGHT, ANGLE_WEIGHT, GOAL_WEIGHT = 0.02, 0.3, 100.0
 MOST_PARTS = 8
 """Chords per sample, at most, where their starts move fast."""
 
-LONGEST_STRETCH = 1.3
-"""Allowance for track that is longer than its samples say, between samples."""
+BLOCK = 16
+"""Chords that are looked at together, before each alone."""
 
 
 @njit(cache=True)
@@ -118,6 +118,25 @@ def _crossing(ax: float, ay: float, bx: float, by: float, x: float, y: float) ->
 
 
 @njit(cache=True)
+def _put_in_boxes(points: FloatArray, n_chords: int, chords: Chords, boxes: FloatArray) -> None:
+    """Fill for each block of chords the box, grown by the reach, of the stretches of track that they span.
+
+    Boxes, shape (n_blocks, 4), are low x, high x, low y, high y.
+    """
+    for block in range(boxes.shape[0]):
+        first, last = block * BLOCK, min((block + 1) * BLOCK, n_chords)
+        start = chords.segment[first]
+        for c in range(first, last):
+            start = min(start, chords.segment[c])
+        low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
+        for i in range(start, chords.end[last - 1] + 2):
+            low_x, high_x = min(low_x, points[i, 0]), max(high_x, points[i, 0])
+            low_y, high_y = min(low_y, points[i, 1]), max(high_y, points[i, 1])
+        boxes[block, 0], boxes[block, 1] = low_x - REACH, high_x + REACH
+        boxes[block, 2], boxes[block, 3] = low_y - REACH, high_y + REACH
+
+
+@njit(cache=True)
 def find_corners(
     points: FloatArray,
     per_link: int,
@@ -132,28 +151,20 @@ def find_corners(
     `chords.depth` and `chords.place` are filled; `passed`, shape (n,), is work space.
     """
     chords.depth[:n_chords] = -np.inf
-    longest, widest = longest_edge(points, per_link), 0
-    for c in range(n_chords):
-        widest = max(widest, chords.end[c] + 1 - chords.segment[c])
-    farthest = LONGEST_STRETCH * widest / per_link + REACH
+    boxes = np.empty(((n_chords + BLOCK - 1) // BLOCK, 4))
+    _put_in_boxes(points, n_chords, chords, boxes)
     for number in range(near.corners.shape[0]):
         x, y = near.corners[number, 0], near.corners[number, 1]
         # Crossings are counted from sample `begin` to sample `done`, where chords are near.
         begin, done, c = 0, -1, -1
         while c + 1 < n_chords:
             c += 1
+            if c % BLOCK == 0:
+                box = c // BLOCK
+                if not (boxes[box, 0] <= x <= boxes[box, 1] and boxes[box, 2] <= y <= boxes[box, 3]):
+                    c += BLOCK - 1
+                    continue
             j, k = chords.end[c], chords.segment[c]
-            # No part of the loop is farther from its end than the stretch is long.
-            far = LONGEST_STRETCH * (j + 1 - k) / per_link + REACH
-            squared = (x - points[j, 0]) ** 2 + (y - points[j, 1]) ** 2
-            if squared > far * far:
-                skipped = int((np.sqrt(squared) - farthest) / longest) if squared > farthest * farthest else 0
-                if skipped > 1:
-                    # The end of no chord in between comes near enough.
-                    if j + skipped >= points.shape[0]:
-                        break
-                    c = chords.of_sample[j + skipped]
-                continue
             ax, ay = _on(points, k, chords.share[c])
             bx, by = _on(points, j, chords.end_share[c])
             ux, uy = (bx - ax) / chord, (by - ay) / chord
