@@ -12,7 +12,7 @@ import numpy as np
 from planners.bench.mazes import plan_in_maze, rod_in_maze, warm_up
 from planners.bench.pool import Tell, over_processes, worker_pool
 
-__all__ = ["LENGTHS", "random_mazes"]
+__all__ = ["LENGTHS", "ROUNDS", "random_mazes"]
 
 LENGTHS = {"clutter": 200.0, "corridor": 250.0}
 """Link length by kind of maze, in px."""
@@ -21,10 +21,14 @@ PLANNER, TIME_BUDGET, ROD_BUDGET = "auto", 10.0, 5.0
 """Planner, seconds that a maze may take, and that the proof may that no rod passes where none was solved."""
 
 
+ROUNDS = 5
+"""How often one worker and all are compared: other work on the machine comes and goes."""
+
+
 def random_mazes(
     seeds: Sequence[int], workers: int, n_compared: int, tell: Tell = lambda: None
 ) -> dict[str, Any]:
-    """Plan in random mazes with all workers, and in some of those solved with one worker and with all again.
+    """Plan in random mazes with all workers, then in some of those solved with one worker and all in turns.
 
     Parameters
     ----------
@@ -43,17 +47,17 @@ def random_mazes(
     tasks = [
         (f"{kind}-{seed}", length, PLANNER, TIME_BUDGET) for seed in seeds for kind, length in LENGTHS.items()
     ]
-    with worker_pool(workers, warm_up) as pool:
+    with worker_pool(workers, warm_up) as pool, worker_pool(1, warm_up) as single:
         _wait_for(pool, workers)
+        _wait_for(single, 1)
         rows, seconds = _timed(pool, tasks, tell)
         solved = {row["maze"] for row in rows if row["status"] == "solved"}
         failed = [(name, length, ROD_BUDGET) for name, length, *_ in tasks if name not in solved]
         rods = {row["maze"]: row["rod"] for row in over_processes(pool, rod_in_maze, failed)}
         compared = [task for task in tasks if task[0] in solved][:n_compared]
-        _, all_seconds = _timed(pool, compared, tell)
-    with worker_pool(1, warm_up) as pool:
-        _wait_for(pool, 1)
-        _, one_seconds = _timed(pool, compared, tell)
+        rounds = [[_timed(each, compared, tell)[1] for each in (single, pool)] for _ in range(ROUNDS)]
+    one_seconds, all_seconds = np.median(rounds, axis=0).tolist()
+    ratios = [one / both for one, both in rounds]
     open_ = [row for row in rows if row["maze"] not in solved and rods[row["maze"]] != "no"]
     kinds = {kind: [row for row in rows if row["maze"].startswith(kind)] for kind in LENGTHS}
     return {
@@ -64,7 +68,8 @@ def random_mazes(
         "compared": len(compared),
         "one_worker_per_second": len(compared) / one_seconds,
         "all_workers_per_second": len(compared) / all_seconds,
-        "ratio": one_seconds / all_seconds,
+        "ratio": float(np.median(ratios)),
+        "ratios": ratios,
         "unsolved": [f"{row['maze']}: {row['status']}" for row in open_],
         "rows": rows,
     }

@@ -29,7 +29,7 @@ __all__ = [
     "memory",
     "serpentine_length",
     "stages",
-    "time_plan",
+    "time_plans",
 ]
 
 PLANNERS = ("auto", "sweep")
@@ -71,17 +71,44 @@ print(imported - start, time.perf_counter() - start)
 """Prints the seconds of the import, and of import and first plan."""
 
 
-def time_plan(
-    maze: Maze, link_length: float, planner: str, runs: int, tell: Tell = lambda: None
-) -> dict[str, Any]:
-    """Plan several times after one that warms up.
+def time_plans(
+    cases: Sequence[tuple[Maze, float, str]], runs: int, tell: Tell = lambda: None
+) -> list[dict[str, Any]]:
+    """Plan several times in each case, after once that warms up; in turns, so that noise comes to all alike.
+
+    Parameters
+    ----------
+    cases : sequence of (maze, link length, planner)
+        What is planned.
+    runs : int
+        Of each.
+    tell : callable
+        Called after each.
 
     Returns
     -------
-    row : dict
-        Status, numbers of links and poses, length of the path and of the motion's arrays, and by stage (with
+    rows : list of dict
+        Status, numbers of links and poses, length of the path, shape of the joints, and by stage (with
         `maze to poses` for all but the check) median and least seconds.
     """
+    rows = [_first_plan(*case) for case in cases]
+    every: list[list[dict[str, float]]] = [[] for _ in cases]
+    for _ in range(runs):
+        for (maze, length, planner), row, timed in zip(cases, rows, every, strict=True):
+            if row["status"] == "solved":
+                timings = plan(maze, ArmSpec(link_length=length), planner, explain=False).timings
+                before = sum(value for stage, value in timings.items() if stage != "validate")
+                timed.append({**timings, "maze to poses": before})
+            tell()
+    for row, timed in zip(rows, every, strict=True):
+        if timed:
+            row["runs"] = runs
+            row["median_s"] = {stage: float(np.median([run[stage] for run in timed])) for stage in timed[0]}
+            row["least_s"] = {stage: min(run[stage] for run in timed) for stage in timed[0]}
+    return rows
+
+
+def _first_plan(maze: Maze, link_length: float, planner: str) -> dict[str, Any]:
     arm = ArmSpec(link_length=link_length)
     result = plan(maze, arm, planner, explain=False)
     row: dict[str, Any] = {
@@ -90,43 +117,32 @@ def time_plan(
         "planner": planner if planner == result.planner else f"{planner} ({result.planner})",
         "status": str(result.status),
     }
-    if result.motion is None:
-        return row
     geometry = Query(maze=maze, arm=arm).geometry
-    assert geometry is not None
-    every: list[dict[str, float]] = []
-    for _ in range(runs):
-        timings = plan(maze, arm, planner, explain=False).timings
-        before = sum(value for stage, value in timings.items() if stage != "validate")
-        every.append({**timings, "maze to poses": before})
-        tell()
+    if result.motion is None or geometry is None:
+        return row
     return {
         **row,
         "n_links": result.motion.n_links,
         "n_poses": result.motion.n_poses,
         "shape": list(result.motion.joints.shape),
         "path_length": geometry.path.length,
-        "runs": runs,
-        "median_s": {stage: float(np.median([run[stage] for run in every])) for stage in every[0]},
-        "least_s": {stage: min(run[stage] for run in every) for stage in every[0]},
     }
 
 
 def stages(lengths: Sequence[float], runs: int, tell: Tell = lambda: None) -> list[dict[str, Any]]:
     """Time the stages of `fig17a` at some link lengths."""
-    return [time_plan(fig17a(), length, planner, runs, tell) for planner in PLANNERS for length in lengths]
+    cases = [(fig17a(), length, planner) for planner in PLANNERS for length in lengths]
+    return time_plans(cases, runs, tell)
 
 
 def growth_with_links(lengths: Sequence[float], runs: int, tell: Tell = lambda: None) -> list[dict[str, Any]]:
     """Time `fig17a` with ever shorter links, on a way that stays the same; exponents over links."""
-    mazes = [(fig17a(), length) for length in lengths]
-    return [_growth(mazes, "n_links", planner, runs, tell) for planner in PLANNERS]
+    return _growth([(fig17a(), length) for length in lengths], "n_links", runs, tell)
 
 
 def growth_with_way(turns: Sequence[int], runs: int, tell: Tell = lambda: None) -> list[dict[str, Any]]:
     """Time serpentines of ever more turns, with links of one length; exponents over the path's length."""
-    mazes = [(serpentine(n), serpentine_length()) for n in turns]
-    return [_growth(mazes, "path_length", planner, runs, tell) for planner in PLANNERS]
+    return _growth([(serpentine(n), serpentine_length()) for n in turns], "path_length", runs, tell)
 
 
 def serpentine_length() -> float:
@@ -134,11 +150,13 @@ def serpentine_length() -> float:
     return INDEX * LONGEST_IN_TURNS
 
 
-def _growth(
-    mazes: Sequence[tuple[Maze, float]], size: str, planner: str, runs: int, tell: Tell
-) -> dict[str, Any]:
-    rows = [time_plan(maze, length, planner, runs, tell) for maze, length in mazes]
-    return {"planner": planner, "rows": rows, "fits": _fits(rows, size)}
+def _growth(mazes: Sequence[tuple[Maze, float]], size: str, runs: int, tell: Tell) -> list[dict[str, Any]]:
+    rows = time_plans([(*maze, planner) for planner in PLANNERS for maze in mazes], runs, tell)
+    parts = [rows[k * len(mazes) : (k + 1) * len(mazes)] for k in range(len(PLANNERS))]
+    return [
+        {"planner": planner, "rows": part, "fits": _fits(part, size)}
+        for planner, part in zip(PLANNERS, parts, strict=True)
+    ]
 
 
 def _fits(rows: list[dict[str, Any]], size: str) -> dict[str, dict[str, float]]:

@@ -14,7 +14,7 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
 from planners.baselines.ompl_sampling import is_installed
 from planners.bench.beside import beside_ompl, ompl_tasks
-from planners.bench.many import random_mazes
+from planners.bench.many import ROUNDS, random_mazes
 from planners.bench.pool import bar
 from planners.bench.single import PLANNERS, first_calls, growth_with_links, growth_with_way, memory, stages
 
@@ -171,7 +171,7 @@ def _measure(part: str, sizes: Sizes, workers: int, quiet: bool) -> Any:
             with bar(part, sizes.fresh, quiet) as tell:
                 return first_calls(sizes.fresh, tell)
         case "random mazes":
-            with bar(part, 2 * (sizes.seeds + sizes.compared), quiet) as tell:
+            with bar(part, 2 * (sizes.seeds + ROUNDS * sizes.compared), quiet) as tell:
                 return random_mazes(range(sizes.seeds), workers, sizes.compared, tell)
         case _:
             return _beside(sizes, workers, quiet)

@@ -73,7 +73,18 @@ def _stages(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
 
 def _growth(what: str, data: Mapping[str, Any]) -> Iterator[str]:
     yield from _table(
-        ("link", "path", "links", "poses", "maze to poses", "plan", "poses", "per pose", "validate"),
+        (
+            "link",
+            "planner",
+            "path",
+            "links",
+            "poses",
+            "maze to poses",
+            "plan",
+            "poses",
+            "per pose",
+            "validate",
+        ),
         [_growth_row(row) for row in data["rows"]],
     )
     yield ""
@@ -89,10 +100,11 @@ def _growth(what: str, data: Mapping[str, Any]) -> Iterator[str]:
 
 def _growth_row(row: Mapping[str, Any]) -> tuple[str, ...]:
     if row["status"] != "solved":
-        return (f"{row['link_length']:g}", row["status"], *["-"] * 7)
+        return (f"{row['link_length']:g}", row["planner"], row["status"], *["-"] * 7)
     least = row["least_s"]
     return (
         f"{row['link_length']:g}",
+        row["planner"],
         f"{row['path_length']:.0f}",
         str(row["n_links"]),
         str(row["n_poses"]),
@@ -168,7 +180,8 @@ def _random_mazes(data: Mapping[str, Any]) -> Iterator[str]:
         f"{data['mazes_per_second']:.2f} mazes per second with {data['workers']} workers, unsolved ones "
         f"included. {data['compared']} of the solved ones: {data['one_worker_per_second']:.2f} per second "
         f"with one worker, {data['all_workers_per_second']:.2f} with {data['workers']}, a ratio of "
-        f"{data['ratio']:.2f}."
+        f"{data['ratio']:.2f} ({min(data['ratios']):.2f} to {max(data['ratios']):.2f} in "
+        f"{len(data['ratios'])} rounds in turns)."
     )
 
 
