@@ -11,6 +11,7 @@ from hrsnake_env.arm import ArmSpec
 from hrsnake_env.maze import Maze
 from planners.kernels.types import FloatArray
 from planners.problem import Candidate, Failure, Motion, PlanningStatus, Progress, ValidationReport
+from planners.routes import routes
 from planners.survey import Geometry, survey
 
 __all__ = ["Query"]
@@ -62,8 +63,15 @@ class Query:
         """Path, beams and corners of the route; None if nothing leads to the goal. Computed once."""
         key = id(self.route)
         if key not in self.surveys:
-            self.surveys[key] = survey(self.maze, self.arm.link_radius, self.route)
+            self.surveys[key] = survey(self.maze, self.arm.link_radius, self.route) or self._medial()
         return self.surveys[key]
+
+    def _medial(self) -> Geometry | None:
+        """Survey the medial axis' first way: some 240 passage widths from the goal the potential vanishes."""
+        if self.route is not None:
+            return None
+        way = next(routes(self.maze, self.arm.link_length, link_radius=self.arm.link_radius), None)
+        return None if way is None else survey(self.maze, self.arm.link_radius, way.points)
 
     def check(self, motion: Motion) -> ValidationReport | None:
         """Ask the checker about a motion; None if there is none to ask."""

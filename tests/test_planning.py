@@ -6,15 +6,17 @@ import time
 import numpy as np
 import pytest
 from shapely import unary_union
-from shapely.geometry import box
+from shapely.geometry import LineString, box
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
-from hrsnake_env.mazes import fig19
+from hrsnake_env.mazes import fig19, serpentine
 from planners import PLANNERS, PlanningStatus, plan, planning, validate
 from planners.portfolio import Question
 from planners.problem import Candidate
+from planners.query import Query
+from planners.survey import survey
 
 EVERY = pytest.mark.parametrize("planner", PLANNERS)
 
@@ -176,6 +178,15 @@ def test_where_the_potential_leads_into_a_narrow_way_another_way_is_found():
     for length in (200.0, 280.0, 320.0):
         result = plan(maze, ArmSpec(link_length=length), explain=False)
         assert result.solved, result.reason
+
+
+def test_a_way_too_long_for_the_potential_follows_the_medial_axis():
+    # Over 240 passage widths the potential falls below the smallest number.
+    maze = serpentine(40, width=100.0, pitch=140.0, leg=560.0)
+    assert survey(maze) is None
+    geometry = Query(maze=maze, arm=ArmSpec(link_length=100.0)).geometry
+    assert geometry.path.length > 240 * 100.0
+    assert maze.free_space.covers(LineString(geometry.path.points))
 
 
 def test_a_refused_motion_says_where_it_is_refused(monkeypatch):
