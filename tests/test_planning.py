@@ -182,7 +182,7 @@ def test_where_the_potential_leads_into_a_narrow_way_another_way_is_found():
 
 def test_a_way_too_long_for_the_potential_follows_the_medial_axis():
     # Over 240 passage widths the potential falls below the smallest number.
-    maze = serpentine(40, width=100.0, pitch=140.0, leg=560.0)
+    maze = serpentine(50, width=100.0, pitch=140.0, leg=700.0)
     assert survey(maze) is None
     geometry = Query(maze=maze, arm=ArmSpec(link_length=100.0)).geometry
     assert geometry.path.length > 240 * 100.0
