@@ -120,6 +120,13 @@ def test_a_state_is_free_when_the_arm_is_in_the_free_space_and_does_not_meet_its
     assert ARM.is_free(state) == (inside and line.is_simple)
 
 
+@given(STATES, STATES)
+def test_an_edge_keeps_the_checkers_step_limit_and_the_feeders_rule(a, b):
+    motion = ARM.motion([np.zeros(4), np.array(a), np.array(b)])
+    report = validate(motion, ARM.query.maze)
+    assert not {"step", "feeder", "start", "length", "inconsistent"} & {fault.kind for fault in report.faults}
+
+
 def test_the_start_is_free_and_the_edge_into_the_wall_is_not():
     start, straight, through = np.zeros(4), np.array([3.0, 0, 0, 0]), np.array([4.0, 1.5, 0, 0])
     assert ARM.edge_is_free(start, straight)

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hrsnake_env.arm import joints_from_configuration
 from hrsnake_env.errors import InputError
 from planners.kernels import fed_arm as kernel
 from planners.kernels.types import FloatArray
@@ -25,6 +26,7 @@ from planners.problem import Candidate, Failure, Motion, PlanningStatus
 from planners.query import Query
 from planners.sweep_planner import plan_sweep
 from planners.track_planner import plan_track
+from planners.validation import STEP_LIMIT
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -53,6 +55,9 @@ MOST_BENT = 3.0
 
 CELL = 0.25
 """Size of a cell of KPIECE1's projection, the place of the tip, in link lengths."""
+
+SHARE_OF_LIMIT = 0.9
+"""Of the checker's step limit, that poses keep."""
 
 GOAL_STATES = 8
 """Whole arms at the goal that a planner that wants goal states is given."""
@@ -196,22 +201,33 @@ class FedArm:
     def motion(self, states: list[FloatArray]) -> Motion:
         """Return the poses at which the edges were checked, and those where a joint passes the base."""
         length, _, base_pose = self.terms
-        parts = [states[0][None]]
-        for a, b in pairwise(states):
-            levels = kernel.edge_levels(a, b, *self.terms, STEP * length, self.points)
-            shares = np.arange(1, (1 << levels) + 1) / (1 << levels)
-            passing = np.arange(math.ceil(min(a[0], b[0])), math.floor(max(a[0], b[0])) + 1)
+        path = np.concatenate([states[0][None], *(self._edge(a, b) for a, b in pairwise(states))])
+        return Motion.from_configurations(*self._configurations(path), length, base_pose)
+
+    def _edge(self, a: FloatArray, b: FloatArray) -> FloatArray:
+        """Return states after a, up to b, so near to each other that poses keep the checker's step limit."""
+        length, _, base_pose = self.terms
+        levels = kernel.edge_levels(a, b, *self.terms, STEP * length, self.points)
+        while True:
+            shares = np.arange((1 << levels) + 1) / (1 << levels)
             if a[0] != b[0]:
+                passing = np.arange(math.ceil(min(a[0], b[0])), math.floor(max(a[0], b[0])) + 1)
                 shares = np.union1d(shares, (passing - a[0]) / (b[0] - a[0]))
             edge = a + shares[:, None] * (b - a)
             whole = np.round(edge[:, 0])
             edge[:, 0] = np.where(np.abs(edge[:, 0] - whole) < 1e-12, whole, edge[:, 0])
-            parts.append(edge)
-        path = np.concatenate(parts)
-        past = path[:, :1] - (self.n_links - np.arange(self.n_links))
+            joints = joints_from_configuration(*self._configurations(edge), length, base_pose)
+            steps = np.linalg.norm(np.diff(joints, axis=0), axis=-1)
+            if steps.max() <= SHARE_OF_LIMIT * STEP_LIMIT * length or levels == kernel.MOST_LEVELS:
+                return np.asarray(edge[1:])
+            levels += 1
+
+    def _configurations(self, states: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return feed, shape (n,), and joint angles, shape (n, n_links), of states, shape (n, n_links)."""
+        past = states[:, :1] - (self.n_links - np.arange(self.n_links))
         limits = RELEASE * np.maximum(past, 0.0)
-        angles = np.clip(np.column_stack([np.zeros(len(path)), path[:, 1:]]), -limits, limits)
-        return Motion.from_configurations(path[:, 0] * length, angles, length, base_pose)
+        angles = np.clip(np.column_stack([np.zeros(len(states)), states[:, 1:]]), -limits, limits)
+        return states[:, 0] * self.terms[0], angles
 
 
 def _solve(
