@@ -17,7 +17,11 @@ test: $(VENV)/.all
 kernels: $(VENV)/.all
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest tests/test_kernels.py tests/test_geometry.py \
 		tests/test_planning.py::test_the_papers_links_pass_the_benchmark_without_penetration \
-		tests/test_sweep.py::test_every_vertex_is_one_link_length_from_its_start
+		tests/test_sweep.py::test_every_vertex_is_one_link_length_from_its_start \
+		tests/test_rod_bound.py::test_a_small_maze_is_decided_in_plain_python_too \
+		tests/test_track.py::test_links_near_the_limit_pass_every_turn \
+		tests/test_track.py::test_feeding_keeps_lengths_steps_and_the_track \
+		tests/test_track.py::test_hits_and_self_crossings_are_those_of_shapely
 
 ## lint, types, contracts: what CI checks besides the tests
 lint: $(VENV)/.all
