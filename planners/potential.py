@@ -6,9 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sparse
 import shapely
-from scipy.sparse.linalg import splu
 from shapely.geometry import Point
 
 from hrsnake_env.maze import Maze
@@ -135,6 +133,9 @@ def laplace_potential(maze: Maze, *, width: float | None = None) -> Potential:
 def _solve(
     inside: BoolArray, blocked_x: BoolArray, blocked_y: BoolArray, goal: tuple[int, int]
 ) -> FloatArray:
+    import scipy.sparse as sparse  # takes a tenth of a second, which programs that do not plan save
+    from scipy.sparse.linalg import splu
+
     unknown = inside.copy()
     unknown[goal] = False
     index = np.full(inside.shape, -1)
