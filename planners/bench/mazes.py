@@ -15,6 +15,9 @@ __all__ = ["longest_in_maze", "plan_in_maze", "rod_in_maze", "warm_up"]
 FINENESS = 0.005
 """Step of lengths, and accuracy of the bound that they start from."""
 
+HALVINGS = 3
+"""Between the longest step that passes and the next: to an eighth of a step."""
+
 SHORTEST = 0.5
 """Length at which the scan gives up, in bounds."""
 
@@ -58,6 +61,19 @@ def rod_in_maze(name: str, length: float, seconds: float) -> dict[str, Any]:
     return {"task": [name, length, seconds], "maze": name, "link_length": length, "rod": str(verdict.passes)}
 
 
+def closed_in(maze: Maze, planner: str, time_budget: float, passes: float) -> float:
+    """Close in, by halving, between a length that passes and the step above it that does not."""
+    fails = passes / (1.0 - FINENESS)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (passes + fails)
+        arm = ArmSpec(link_length=middle)
+        if plan(maze, arm, planner, time_budget=time_budget, explain=False).solved:
+            passes = middle
+        else:
+            fails = middle
+    return passes
+
+
 def longest_in_maze(name: str, planner: str, time_budget: float) -> dict[str, Any]:
     """Try lengths from the longest rod's downwards until the planner has a valid motion.
 
@@ -78,6 +94,8 @@ def longest_in_maze(name: str, planner: str, time_budget: float) -> dict[str, An
         if result.solved:
             longest = length
         length *= 1.0 - FINENESS
+    if longest is not None and longest < bound.upper:
+        longest = closed_in(maze, planner, time_budget, longest)
     return {
         "task": [name, planner, time_budget],
         "maze": name,
