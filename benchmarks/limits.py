@@ -8,6 +8,7 @@ stopped is gone on with. Prints the table of the README and writes `benchmarks/r
 from __future__ import annotations
 
 import json
+import math
 import sys
 import time
 from pathlib import Path
@@ -74,8 +75,8 @@ def main() -> None:
         links, length = row["fewest"]
         print(
             f"| {name} | {row['longest']:.1f} ({row['planner']}) | {row['bound_lower']:.1f} to "
-            f"{row['bound_upper']:.1f} | {row['index']:.3f} | {row['links']} | {links} of {length:.1f} "
-            f"| {len(row['shorter_failed'])} of {len(SHORTER)} | {row['seconds']:.1f} s |"
+            f"{row['bound_upper']:.1f} | {math.floor(1e4 * row['index']) / 1e4:.4f} | {row['links']} | {links} of {length:.1f} "
+            f"| {len(row['shorter_failed'])} of {len(SHORTER)} |"
         )
 
 
