@@ -67,15 +67,14 @@ def main() -> None:
                 rows[name] = measure(name, bars)
                 with replacing(RESULTS) as part:
                     part.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-    print(
-        "| maze | longest link | longest rod | index | links | fewest links | shorter ones that fail | time |"
-    )
-    print("|---|---|---|---|---|---|---|---|")
+    print("| maze | longest link | longest rod | index | links | fewest links | shorter that fail |")
+    print("|---|---|---|---|---|---|---|")
     for name, row in rows.items():
         links, length = row["fewest"]
+        index = math.floor(1e4 * row["index"]) / 1e4
         print(
             f"| {name} | {row['longest']:.1f} ({row['planner']}) | {row['bound_lower']:.1f} to "
-            f"{row['bound_upper']:.1f} | {math.floor(1e4 * row['index']) / 1e4:.4f} | {row['links']} | {links} of {length:.1f} "
+            f"{row['bound_upper']:.1f} | {index:.4f} | {row['links']} | {links} of {length:.1f} "
             f"| {len(row['shorter_failed'])} of {len(SHORTER)} |"
         )
 
