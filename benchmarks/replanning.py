@@ -104,9 +104,7 @@ def main() -> None:
         "machine": {"processor": platform.machine(), "cores": os.cpu_count()},
         "scenes": {title: run(scene, title) for title, scene in scenes.items()},
     }
-    print(
-        "\n| per frame | frames | unsolved | not warm | median | 90 % | from nothing, median | ratio |"
-    )
+    print("\n| per frame | frames | unsolved | not warm | median | 90 % | from nothing, median | ratio |")
     print("|---|---|---|---|---|---|---|---|")
     for title, row in results["scenes"].items():
         print(
