@@ -20,7 +20,7 @@ import numpy as np
 from planners.corners import critical_corners
 from planners.kernels import sweep as kernel
 from planners.obstruction import least_depth, wall_nearest_to
-from planners.problem import Candidate, Failure, Motion, PlanningStatus, ValidationReport
+from planners.problem import Candidate, Failure, Fault, Motion, PlanningStatus, ValidationReport
 from planners.query import Query
 from planners.survey import Geometry
 from planners.sweep_track import Fineness, Track, aim_line, grow, motion_of
@@ -109,7 +109,8 @@ class _Search:
         self.query, self.geometry = query, geometry
         self.corners = critical_corners(geometry.path, geometry.beams, MIN_CURVATURE, MAX_INNER_BEAM)
         self.best: Track | None = None
-        self.refused: Motion | None = None
+        self.motion: Motion | None = None
+        self.report: ValidationReport | None = None
         self.seconds = {"plan": 0.0, "poses": 0.0}
         self.left, self.work, self.share = MAX_ATTEMPTS, MAX_VERTICES, 0.0
 
@@ -124,19 +125,17 @@ class _Search:
             self.left, self.work, self.share = MAX_ATTEMPTS, MAX_VERTICES, number / len(FINENESSES)
             track, chosen = self._reach(fineness, chosen)
             if track.reached:
-                motion, report = self._checked(track)
-                if report is None or report.valid:
-                    return motion
-                if strict or report.faults[0].kind == "crossing":
-                    for other, _ in self._other_ways(track, chosen, self._nearest_index(report)):
-                        if other.reached:
-                            motion, report = self._checked(other)
-                            if report is None or report.valid:
-                                return motion
-                strict = strict or (report is not None and report.faults[0].kind != "crossing")
+                if self._accepts(track):
+                    return self.motion
+                crossing = self._fault().kind == "crossing"
+                if strict or crossing:
+                    others = self._other_ways(track, chosen, self._nearest_index(self._fault()))
+                    if any(other.reached and self._accepts(other) for other, _ in others):
+                        return self.motion
+                strict = strict or not crossing
             if self.query.late:
                 break
-        return self.refused
+        return self.motion
 
     def gets_past(self, s: float, fineness: Fineness) -> bool:
         """Tell whether a track gets beyond a place on the path, s in maze units from the base."""
@@ -211,14 +210,21 @@ class _Search:
         self.query.tell("plan", self.share + (1.0 - self.left / MAX_ATTEMPTS) / len(FINENESSES))
         return track
 
-    def _checked(self, track: Track) -> tuple[Motion, ValidationReport | None]:
+    def _accepts(self, track: Track) -> bool:
+        """Make the motion of a track and ask the checker about it; without a checker, accept it."""
         clock = time.perf_counter()
-        self.refused = motion = motion_of(track, self.query.arm.link_length, self.query.maze)
+        self.motion = motion_of(track, self.query.arm.link_length, self.query.maze)
         self.seconds["poses"] += time.perf_counter() - clock
-        return motion, self.query.check(motion)
+        self.report = self.query.check(self.motion)
+        return self.report is None or self.report.valid
 
-    def _nearest_index(self, report: ValidationReport) -> int:
-        away = self.geometry.path.points - np.asarray(report.faults[0].place)
+    def _fault(self) -> Fault:
+        assert self.report is not None  # the last motion was refused
+        return self.report.faults[0]
+
+    def _nearest_index(self, fault: Fault) -> int:
+        place = self.geometry.maze.goal if fault.place is None else np.asarray(fault.place)
+        away = self.geometry.path.points - place
         return int(np.argmin(np.hypot(*away.T)))
 
 
