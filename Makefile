@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INPUTS := pyproject.toml constraints.txt
 
-.PHONY: demo test kernels lint types contracts check format clean
+.PHONY: demo test notebooks kernels lint types contracts check format clean
 
 ## demo: plan, check and simulate the paper's benchmark; writes demo/
 demo: $(VENV)/.core
@@ -12,6 +12,10 @@ demo: $(VENV)/.core
 ## test: run all tests
 test: $(VENV)/.all
 	$(BIN)/python -m pytest
+
+## notebooks: execute the notebooks, and write them with their figures to notebooks/build/
+notebooks: $(VENV)/.all
+	$(BIN)/python docs/execute_notebooks.py
 
 ## kernels: the tests of the kernels once more as plain Python, where an index out of bounds is an error
 kernels: $(VENV)/.all
@@ -42,7 +46,7 @@ format: $(VENV)/.all
 	$(BIN)/ruff format .
 
 clean:
-	rm -rf $(VENV) demo
+	rm -rf $(VENV) demo notebooks/build
 
 $(BIN)/python:
 	$(PYTHON) -c 'import sys; sys.exit("hrsnake needs Python 3.11 or newer; try: make demo PYTHON=python3.11" if sys.version_info < (3, 11) else 0)'

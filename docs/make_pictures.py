@@ -13,14 +13,14 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, PathPatch, Wedge
-from matplotlib.path import Path as Outline
+from matplotlib.patches import Circle, Wedge
 
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
 from hrsnake_env.rendering import COLOURS
 from planners.corners import critical_corners
+from planners.figures import draw_rings, draw_walls
 from planners.kernels.rod import free_directions
 from planners.survey import survey
 from planners.sweep_planner import FINENESSES, MAX_INNER_BEAM, MIN_CURVATURE, VARIANTS
@@ -43,19 +43,6 @@ def grown_track(maze: Maze) -> Track:
     track = grow(geometry, arm, FINENESSES[1], aim)
     assert track.reached
     return track
-
-
-def draw_walls(axes: Axes, rings: list[FloatArray]) -> None:
-    """Draw free space in white, walls in grey."""
-    parts = [Outline(ring, [Outline.MOVETO, *[Outline.LINETO] * (len(ring) - 2), 79]) for ring in rings]
-    outline = Outline.make_compound_path(*parts)
-    axes.set_facecolor(COLOURS["wall"])
-    axes.add_patch(PathPatch(outline, facecolor="white", edgecolor="none", zorder=0))
-    axes.add_patch(PathPatch(outline, facecolor="none", edgecolor=COLOURS["edge"], linewidth=1.3, zorder=6))
-    axes.set_aspect("equal")
-    axes.set_xticks([])
-    axes.set_yticks([])
-    axes.spines[:].set_visible(False)
 
 
 def intervals(maze: Maze, points: FloatArray) -> list[FloatArray]:
@@ -98,7 +85,7 @@ def draw_viable_intervals(out: Path) -> None:
     figure = Figure(figsize=(10.0, 6.6), dpi=140, layout="constrained")
     FigureCanvasAgg(figure)
     place, chart = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
-    draw_walls(place, list(maze.rings))
+    draw_walls(place, maze)
     draw_wedges(place, track, end, found[0], alive[0])
     draw_bands(chart, way, found, alive, track.headings[end])
     save(figure, out)
@@ -178,7 +165,7 @@ def draw_track_chords_poses(out: Path) -> None:
     figure = Figure(figsize=(10.0, 3.5), dpi=140, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots()
-    draw_walls(axes, [turned(ring) for ring in maze.rings])
+    draw_rings(axes, [turned(ring) for ring in maze.rings])
     ends = np.arange(per_link, track.n, 3)
     chords = np.stack([points[track.start[ends]], points[ends]], axis=1)
     axes.add_collection(LineCollection(list(chords), colors="#9aa1ab", linewidths=0.35, alpha=0.8, zorder=1))

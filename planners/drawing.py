@@ -10,7 +10,6 @@ from typing import Any, Protocol
 import numpy as np
 import shapely
 from matplotlib.animation import PillowWriter
-from matplotlib.collections import LineCollection
 from matplotlib.image import imsave
 
 from hrsnake_env.arm import ArmSpec, FloatArray
@@ -19,13 +18,11 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
 from hrsnake_env.rendering import COLOURS, MazePicture
+from planners.figures import draw_beams, draw_path, mark_corner
 from planners.problem import Motion, PlanningResult, Progress
 from planners.survey import Geometry, survey
 
 __all__ = ["animate", "draw_failure", "draw_geometry", "draw_poses", "draw_result"]
-
-GREEN, RED = "#1a9850", "#d73027"
-"""The paper's colours of the left and the right beams."""
 
 TEXT_WIDTH = 3.2
 """Of what stands beside a picture of a failure, in inches."""
@@ -92,29 +89,10 @@ def draw_geometry(maze: Maze, motion: Motion | None, out: Path, link_radius: flo
 
 
 def _draw_beams(picture: MazePicture, geometry: Geometry) -> None:
-    axes, path, beams = picture.axes, geometry.path, geometry.beams
-    for ends, colour in ((beams.left, GREEN), (beams.right, RED)):
-        lines = np.stack([path.points, ends], axis=1)
-        axes.add_collection(LineCollection(list(lines), colors=colour, linewidths=0.4, alpha=0.7))
-    axes.plot(*path.points.T, color="black", linewidth=1.4)
+    draw_beams(picture.axes, geometry.beams, linewidth=0.4)
+    draw_path(picture.axes, geometry.path)
     for corner in geometry.corners:
-        run = path.points[corner.first : corner.last + 1]
-        colour = GREEN if corner.turn > 0 else RED
-        axes.plot(*run.T, color=colour, linewidth=3.5, solid_capstyle="round")
-        axes.plot(*corner.place, marker="o", color="black", markersize=4)
-        middle = run[len(run) // 2]
-        outward = middle - corner.place
-        axes.annotate(
-            f"{corner.name} corner",
-            middle,
-            xytext=16.0 * outward / np.hypot(*outward),
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            fontsize=8,
-            weight="bold",
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
-        )
+        mark_corner(picture.axes, geometry.path, corner)
 
 
 def draw_poses(maze: Maze, run: Run, out: Path) -> None:
