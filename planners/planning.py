@@ -12,6 +12,7 @@ import numpy as np
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
+from planners.baselines.path_following import plan_path_following
 from planners.beam_planner import plan_beam
 from planners.obstruction import wall_nearest_to
 from planners.portfolio import Question, first_questions, further_questions
@@ -37,6 +38,7 @@ PLANNERS: dict[str, Callable[[Query], Candidate]] = {
     "beam": plan_beam,
     "sweep": plan_sweep,
     "track": plan_track,
+    "follow": plan_path_following,  # to compare with; `auto` does not ask it
 }
 """All planners by name."""
 
