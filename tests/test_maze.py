@@ -5,12 +5,27 @@ import math
 
 import numpy as np
 import pytest
-from shapely.geometry import MultiPolygon, Polygon, box
+from shapely.geometry import MultiPolygon, Point, Polygon, box
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
-from hrsnake_env.mazes import LEGS, MAZES, corridor_family, fig19, serpentine
+from hrsnake_env.mazes import (
+    LEGS,
+    MAZES,
+    PAPER_LINK_LENGTHS,
+    corridor_family,
+    fig17a,
+    fig17b,
+    fig17c,
+    fig17d,
+    fig19,
+    serpentine,
+)
+from planners import plan
+from planners.rod_bound import Passage, rod_passes
+from planners.rollout import simulate_motion
+from planners.survey import survey
 
 
 def hall(**changes):
@@ -86,6 +101,80 @@ def test_fig19_has_the_papers_lengths():
 
 def test_fig19_is_the_corridor_of_its_family():
     assert fig19().free_space.equals(corridor_family("U40").free_space)
+
+
+def test_fig17a_has_the_papers_path_within_one_percent():
+    # Section 4 of the paper: a global path of 10,505 px.
+    assert survey(fig17a()).path.length == pytest.approx(10505.0, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("line", "width", "longest"),
+    [
+        ([(0, 0), (0, 900), (136, 900), (136, 0)], 118.0, 254.0),
+        ([(0, 0), (0, 900), (900, 900)], 90.0, 254.558),
+    ],
+)
+def test_every_turn_of_fig17a_is_extremely_tight(line, width, longest):
+    turn = Maze.from_corridors(line, width)
+    assert rod_passes(turn, 0.998 * longest).passes is Passage.YES
+    assert rod_passes(turn, 1.002 * longest).passes is Passage.NO
+    assert PAPER_LINK_LENGTHS["fig17a"] / (1.002 * longest) >= 0.96
+    # Both stand in the maze: the widths of its corridors are these two.
+    beams = survey(fig17a()).beams
+    across = np.hypot(*(beams.left - beams.right).T)
+    assert (np.abs(across - width) < 1.0).mean() > 0.25
+
+
+def test_the_last_bend_of_fig17a_is_as_tight_as_the_others():
+    maze = fig17a()
+    (x, y), top = maze.goal, 877.0
+    last = Maze.from_corridors(
+        [(x - 520, 100), (x - 520, top), (x, top), (x, y - 40)], 90.0, goal=maze.goal, goal_radius=45.0
+    )
+    assert maze.free_space.buffer(1e-6).covers(last.free_space)
+    assert rod_passes(last, 255.2).passes is Passage.NO
+
+
+@pytest.mark.parametrize(
+    ("name", "index"), [("fig19", 0.97), ("fig17a", 0.96), ("fig17b", 0.9), ("fig17c", 0.9), ("fig17d", 0.9)]
+)
+def test_a_link_of_the_papers_workspaces_is_nearly_the_longest_rod_that_passes(name, index):
+    maze, length = Maze.load(name), PAPER_LINK_LENGTHS[name]
+    assert rod_passes(maze, length).passes is Passage.YES
+    assert rod_passes(maze, length / index).passes is Passage.NO
+
+
+@pytest.mark.parametrize(
+    ("name", "light"),
+    [("fig17a", (0.0, 0.0)), ("fig17b", (0.2, 0.8)), ("fig17c", (0.2, 0.8)), ("fig17d", (0.2, 0.8))],
+)
+def test_but_the_first_workspace_they_have_light_places_besides_tight_ones(name, light):
+    # The share of the path along which the walls are farther apart than a link is long.
+    beams = survey(Maze.load(name)).beams
+    share = (np.hypot(*(beams.left - beams.right).T) > PAPER_LINK_LENGTHS[name]).mean()
+    assert light[0] <= share <= light[1]
+
+
+@pytest.mark.parametrize("build", [fig17b, fig17c, fig17d])
+def test_our_workspaces_hold_their_goal_and_are_as_large_as_the_first(build):
+    maze = build()
+    assert maze.free_space.contains(Point(maze.goal).buffer(maze.goal_radius))
+    assert maze.size == pytest.approx(fig17a().size, rel=0.2)
+
+
+@pytest.mark.parametrize("name", PAPER_LINK_LENGTHS)
+def test_the_papers_workspaces_are_solved_and_their_links_merely_pinch_the_walls(name):
+    maze, arm = Maze.load(name), ArmSpec(link_length=PAPER_LINK_LENGTHS[name])
+    motion = plan(maze, arm).motion
+    assert motion is not None
+    if name == "fig17a":  # section 4 of the paper: 45 links, 1870 poses
+        assert motion.n_links == 45 and motion.n_poses >= 1870
+    else:
+        assert 6 <= motion.n_links <= 30
+    episode = simulate_motion(motion, maze, arm)
+    assert episode.success and episode.report.clean
+    assert episode.report.pinch > 0 and episode.report.collision == 0
 
 
 @pytest.mark.parametrize("inward", [1.0, 2.0, 5.0, -5.0])
