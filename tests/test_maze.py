@@ -11,6 +11,7 @@ from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import (
+    FIG17A_LEG,
     LEGS,
     MAZES,
     PAPER_LINK_LENGTHS,
@@ -128,7 +129,7 @@ def test_every_turn_of_fig17a_is_extremely_tight(line, width, longest):
 
 def test_the_last_bend_of_fig17a_is_as_tight_as_the_others():
     maze = fig17a()
-    (x, y), top = maze.goal, 877.0
+    (x, y), top = maze.goal, FIG17A_LEG + 20.0
     last = Maze.from_corridors(
         [(x - 520, 100), (x - 520, top), (x, top), (x, y - 40)], 90.0, goal=maze.goal, goal_radius=45.0
     )
