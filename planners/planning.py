@@ -13,7 +13,7 @@ from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners.baselines.path_following import plan_path_following
-from planners.beam_planner import plan_beam
+from planners.beam_planner import plan_as_printed, plan_beam
 from planners.obstruction import wall_nearest_to
 from planners.portfolio import Question, first_questions, further_questions
 from planners.problem import (
@@ -36,6 +36,7 @@ __all__ = ["PLANNERS", "TIME_BUDGET", "plan"]
 
 PLANNERS: dict[str, Callable[[Query], Candidate]] = {
     "beam": plan_beam,
+    "as-printed": plan_as_printed,
     "sweep": plan_sweep,
     "track": plan_track,
     "follow": plan_path_following,  # to compare with; `auto` does not ask it

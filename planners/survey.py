@@ -1,4 +1,4 @@
-"""What every planner looks at first: path, beams and critical corners of a maze (section 2 of the paper)."""
+"""What every planner looks at first: path, beams and corners of a maze (section 2 of the paper)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from hrsnake_env.maze import Maze
 from planners.beams import Beams, cast_beams
-from planners.corners import Corner, critical_corners
+from planners.corners import Corner, critical_corners, semi_critical_corners
 from planners.inset import inset_maze
 from planners.kernels.types import FloatArray
 from planners.path import Path, global_path, path_along
@@ -26,8 +26,10 @@ class Geometry:
     ----------
     maze : Maze
         The maze, with walls grown by the radius of the links.
-    path, beams, corners
+    path, beams
         In that maze.
+    corners, semi_critical : list of Corner
+        The critical and the semi-critical corners.
     timings : dict from str to float
         Seconds by stage: potential, path, beams.
     """
@@ -36,11 +38,12 @@ class Geometry:
     path: Path
     beams: Beams
     corners: list[Corner]
+    semi_critical: list[Corner]
     timings: dict[str, float]
 
 
 def survey(maze: Maze, link_radius: float = 0.0, route: FloatArray | None = None) -> Geometry | None:
-    """Compute path, beams and critical corners of a maze.
+    """Compute path, beams and corners of a maze.
 
     Parameters
     ----------
@@ -73,11 +76,13 @@ def survey(maze: Maze, link_radius: float = 0.0, route: FloatArray | None = None
         return None
     beams = cast_beams(inset, path)
     corners = critical_corners(path, beams)
+    semi_critical = semi_critical_corners(path, beams, corners)
     clock.append(time.perf_counter())
     return Geometry(
         maze=inset,
         path=path,
         beams=beams,
         corners=corners,
+        semi_critical=semi_critical,
         timings=dict(zip(("potential", "path", "beams"), np.diff(clock).tolist(), strict=True)),
     )

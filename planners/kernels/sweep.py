@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from planners.kernels.beam import closest_index, direction_to_distance
+from planners.kernels.beam_rules import coordinate_at_length, nearest_index
 from planners.kernels.rod import WHOLE_TURN, free_directions
 from planners.kernels.types import BoolArray, FloatArray, IntArray
 
@@ -263,7 +263,7 @@ def _lay_axis(
         headings[i] = base_pose[2]
         first[i + 1] = first[i]
         if i >= per_link:
-            index = closest_index(points, track[i, 0], track[i, 1], index, reach)
+            index = nearest_index(points, track[i, 0], track[i, 1], index, reach)
             if not _add_gaps(
                 i, track, base_pose[2], joint_limit, rest[index] < length, length, walls, pad, first, gaps,
                 viable, blocked, found,
@@ -399,8 +399,8 @@ def grow_track(
         joined = _nearest_reached(ahead, heading, first, gaps, reached)
         needed = _into(heading, heading, gaps[joined, 0], gaps[joined, 1])
         px, py = track[ahead, 0], track[ahead, 1]
-        hit, wanted = direction_to_distance(aim_line, px, py, indices[ahead], length)
-        if not hit:
+        hit, wanted = coordinate_at_length(aim_line, px, py, indices[ahead], length)
+        if hit < 0:
             last = aim_line.shape[0] - 1
             wanted = np.arctan2(aim_line[last, 1] - py, aim_line[last, 0] - px)
         wanted = heading + (wanted - heading + np.pi) % TWO_PI - np.pi
@@ -443,7 +443,7 @@ def grow_track(
                     continue
             track[n, 0] = track[origin, 0] + length * np.cos(new)
             track[n, 1] = track[origin, 1] + length * np.sin(new)
-            index = closest_index(points, track[n, 0], track[n, 1], indices[n - 1], reach)
+            index = nearest_index(points, track[n, 0], track[n, 1], indices[n - 1], reach)
             if not _add_gaps(
                 n, track, new, joint_limit, rest[index] < length, length, walls, pad, first, gaps, viable,
                 blocked, found,
@@ -587,9 +587,9 @@ def blocked_chords(line: FloatArray, length: float, walls: FloatArray, blocked: 
     """
     for i in range(line.shape[0]):
         px, py = line[i, 0], line[i, 1]
-        hit, heading = direction_to_distance(line, px, py, i, length)
+        hit, heading = coordinate_at_length(line, px, py, i, length)
         qx, qy = line[-1, 0], line[-1, 1]
-        if hit:
+        if hit >= 0:
             qx, qy = px + length * np.cos(heading), py + length * np.sin(heading)
         blocked[i] = False
         for k in range(walls.shape[0]):
