@@ -8,7 +8,7 @@ section  concept                                    function
 3.1      tangent point                              `tangent_point`
 3.2      closest path point, through the beams      `closest_path_point`
 3.3      closest edge side coordinate               `coordinate_at_length`, of the outer beams' ends
-3.4      path point near semi-critical corners      `is_near_semi_critical`, `coordinate_at_length` of the path
+3.4      path point near semi-critical corners      `is_near_semi_critical`, and 3.3 of the path
 3.5      right and left corner                      `planners.corners.turn_of`
 3.6      blocking                                   `blocking`, `remember_jump`
 3.7      softening                                  `soften`
@@ -97,7 +97,7 @@ NEAR_END = 0.15
 out to this distance on the outer side of a corner."""
 
 REACH = 2.5
-"""How far along the path the end of a link may be from its start, in link lengths: round a thin wall, twice."""
+"""How far along the path a link's end may be from its start, in link lengths: round a thin wall, twice."""
 
 JUMP = 0.15
 """From which change of its aim from pose to pose on a link has jumped, in rad (3.6): 0.15 link lengths."""
@@ -106,7 +106,7 @@ PAD = 3e-4
 """Kept from the walls by a clamped link, in rad about its base-side joint."""
 
 TURN = 12.0
-"""Largest turn of a clamped link in rad per link length of feed: half a radian takes a twenty-fifth of one."""
+"""Largest turn of a clamped link in rad per link length of feed: 0.5 rad takes a twenty-fifth of one."""
 
 STOP = 0.5
 """The motion ends when the tip is this near to the goal, in goal radii."""
@@ -130,12 +130,13 @@ class Rules:
     jump_blocks : bool
         Whether a link is kept from them from a jump of its guide link until that is tangent (3.6).
     softening_degree : int
-        Into how many pieces a sudden jump is divided (3.7), each for a pose of a 240th of a link length of feed.
+        Into how many pieces a sudden jump is divided (3.7), one for each pose of a 240th of a link length of
+        feed; 0 is no softening.
 
     Raises
     ------
     InputError
-        If the degree is less than 1, which is no softening.
+        If the degree is negative.
     """
 
     clamp: bool = True
@@ -145,8 +146,8 @@ class Rules:
     softening_degree: int = 3
 
     def __post_init__(self) -> None:
-        if not self.softening_degree >= 1:
-            raise InputError(f"Expected a softening_degree of at least 1, got {self.softening_degree!r}.")
+        if not self.softening_degree >= 0:
+            raise InputError(f"Expected a softening_degree of at least 0, got {self.softening_degree!r}.")
 
 
 AS_PRINTED = Rules(clamp=False)
@@ -230,7 +231,7 @@ class BeamRun:
     @property
     def n_links(self) -> int:
         """How many links it takes to come this far."""
-        return max(1, math.ceil(self.feeds[-1] / self.link_length - 1e-9))
+        return max(1, math.ceil(float(self.feeds[-1]) / self.link_length - 1e-9))
 
     def motion(self, maze: Maze) -> Motion:
         """Return the motion as far as it goes, not validated."""
@@ -245,7 +246,9 @@ class BeamRun:
         if self.ending == kernel.NO_GAP:
             return f"With its base-side joint at {where}, {which} has no free direction."
         if self.ending == kernel.JUMP:
-            return f"With its base-side joint at {where}, {which} would have to jump to another free direction."
+            return (
+                f"With its base-side joint at {where}, {which} would have to jump to another free direction."
+            )
         return f"All arm that the path can take is fed, and the tip is at {where}, not at the goal."
 
 
@@ -346,10 +349,10 @@ def way_of(geometry: Geometry) -> Way:
     marks.along_x, marks.along_y = path.tangents.T
     marks.corner = marks.next_corner = marks.next_critical = -1
     for number, corner in reversed(list(enumerate(corners))):
-        marks.corner[corner.first : corner.last + 1] = number
-        marks.next_corner[: corner.last + 1] = number
+        marks["corner"][corner.first : corner.last + 1] = number
+        marks["next_corner"][: corner.last + 1] = number
         if corner.critical:
-            marks.next_critical[: corner.last + 1] = number
+            marks["next_critical"][: corner.last + 1] = number
     return Way(
         lines=np.stack([path.points, *(_short_of_walls(beams, side, longest) for side in (+1, -1))]),
         beams=marks,

@@ -223,7 +223,7 @@ class _Checker:
 def _answer(question: Question, checker: _Checker) -> PlanningResult:
     """Ask one planner, and the checker about its motion."""
     name, _, query = question
-    checker.seconds = 0.0
+    checker.seconds, motion = 0.0, None
     try:
         candidate = PLANNERS[name](query)
         if candidate.motion is None:
@@ -241,6 +241,7 @@ def _answer(question: Question, checker: _Checker) -> PlanningResult:
             status=PlanningStatus.OUT_OF_TIME,
             planner=name,
             reason="Time was over before the exact check of a motion was.",
+            failure=None if motion is None else Failure(place=_end_of(motion)),
         )
     timings = {**candidate.timings, "validate": checker.seconds}
     if report.valid:
@@ -264,6 +265,11 @@ def _answer(question: Question, checker: _Checker) -> PlanningResult:
         report=report,
         timings=timings,
     )
+
+
+def _end_of(motion: Motion) -> tuple[float, float]:
+    x, y = motion.joints[-1, -1]
+    return float(x), float(y)
 
 
 def _explained(result: PlanningResult, query: Query) -> PlanningResult:

@@ -232,7 +232,10 @@ def write_bad_files(motion):
 
 
 BAD_INPUT = [
-    ("plan fig20 --link-length 430", "Unknown maze 'fig20'. Available: fig19, fig17a, L, U40"),
+    (
+        "plan fig20 --link-length 430",
+        "Unknown maze 'fig20'. Available: fig19, fig17a, fig17b, fig17c, fig17d, L, U40",
+    ),
     ("plan none.geojson --link-length 430", "Expected a maze file at 'none.geojson', but there is none."),
     ("plan broken.geojson --link-length 430", "Expected JSON in 'broken.geojson'"),
     ("plan list.geojson --link-length 430", "Expected a GeoJSON FeatureCollection, got 'list'."),
@@ -264,7 +267,7 @@ BAD_INPUT = [
         "Expected a motion from the base of maze 'fig19'",
     ),
     ("plan fig19 --link-length 420 --warm-start m.npz", "Expected a warm start with links of 420 px"),
-    ("longest fig20", "Unknown maze 'fig20'. Available: fig19, fig17a, L, U40"),
+    ("longest fig20", "Unknown maze 'fig20'. Available: fig19, fig17a, fig17b, fig17c, fig17d, L, U40"),
     ("longest fig19 --planner best", "Unknown planner 'best'. Available: auto, beam"),
     (
         "longest fig19 --lengths 100,long",

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from shapely.geometry import LineString, Point, box
 
 from hrsnake_env.mazes import MAZES, fig19
-from planners.kernels.beam import closest_index, direction_to_distance, soften, tangent_point
 from planners.kernels.grid import scan_walls
 from planners.kernels.rays import cast_rays
 from planners.kernels.rod import free_directions, nearest_gap
@@ -119,56 +118,6 @@ def test_a_wall_thinner_than_a_cell_still_blocks():
     inside, blocked_x, _ = scan_walls(walls, -3.0, -7.0, 1.0, 7, 15)
     assert not inside.any()
     assert blocked_x[2:12, 3].all()
-
-
-def test_closest_index_does_not_leave_its_neighbourhood():
-    line = np.column_stack([np.zeros(20), np.arange(20.0)])
-    assert closest_index(line, 5.0, 11.2, 10, 5) == 11
-    assert closest_index(line, 5.0, 0.0, 10, 5) == 5
-    assert closest_index(line, 5.0, 99.0, 18, 5) == 19
-
-
-@given(st.floats(2.0, 12.0))
-def test_the_edge_side_is_at_exactly_the_link_length(length):
-    edge = np.column_stack([np.linspace(-3, 20, 47), np.full(47, 1.0)])
-    found, direction = direction_to_distance(edge, 0.0, 0.0, 0, length)
-    assert found
-    if length < math.hypot(3, 1):  # the first point is already too far: the paper takes it
-        assert direction == pytest.approx(math.atan2(1, -3))
-    else:
-        assert length * math.sin(direction) == pytest.approx(1.0)
-        assert math.cos(direction) > 0.0
-
-
-def test_no_edge_side_is_found_beyond_the_end():
-    assert direction_to_distance(np.zeros((4, 2)), 0.0, 0.0, 0, 1.0)[0] is False
-
-
-def circle_path(radius, n=400):
-    """Return path points on a left-hand circle from (radius, 0)."""
-    angle = np.linspace(0, math.pi, n)
-    return radius * np.column_stack([np.cos(angle), np.sin(angle)])
-
-
-def test_the_tangent_point_touches_a_circle_at_the_hand_computed_place():
-    # From a point at distance 2 r from the centre, the tangent touches 60 degrees off the line of centres;
-    # products too small to have a sign put it a few of the 400 points later.
-    points, inside = circle_path(1.0), np.ones(400, dtype=np.int64)
-    i = tangent_point(points, 2.0, 0.0, 0, 5.0, inside)
-    assert math.atan2(points[i, 1], points[i, 0]) == pytest.approx(math.pi / 3, abs=0.03)
-
-
-def test_there_is_no_tangent_point_out_of_reach_or_outside_a_corner():
-    points, inside = circle_path(1.0), np.ones(400, dtype=np.int64)
-    assert tangent_point(points, 2.0, 0.0, 0, 1.5, inside) == -1  # the tangent is sqrt(3) long
-    assert tangent_point(points, 2.0, 0.0, 0, 5.0, np.zeros(400, dtype=np.int64)) == -1
-    assert tangent_point(points, 2.0, 0.0, 0, 5.0, -inside) == -1  # a left bend has no right corner
-
-
-def test_softening_takes_the_short_way_and_no_more_than_allowed():
-    assert soften(0.0, 1.0, 0.1) == pytest.approx(0.1)
-    assert soften(0.0, 2 * math.pi - 0.05, 0.1) == pytest.approx(-0.05)
-    assert soften(10 * math.pi, 0.3, 1.0) == pytest.approx(10 * math.pi + 0.3)
 
 
 def test_the_pad_keeps_the_rod_off_the_walls():

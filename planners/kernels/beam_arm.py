@@ -70,7 +70,7 @@ def choose(way: Way, links: Records, k: int, terms: Terms) -> float:
         link.blocked = blocking(links, k, corner, terms)
         if link.blocked == NOTHING:
             link.choice, link.target, link.corner = TANGENT, target, corner
-            return np.arctan2(points[target, 1] - py, points[target, 0] - px)
+            return float(np.arctan2(points[target, 1] - py, points[target, 0] - px))
     corner = way.beams[index].next_critical
     if corner >= 0:
         edge = way.lines[LEFT if way.corners[corner].turn < 0 else RIGHT]
@@ -233,7 +233,7 @@ def feed_arm(
     way : Way
         Path, beams and corners.
     now, new : Records
-        The arm, in the pose `headings[n - 1]`, and room for a copy. There is one more link than in `headings`.
+        The arm, in the pose `headings[n - 1]`, and room for a copy. There is one more link than there.
     progress : array, shape (3,)
         Number of poses n, feed in ticks, and ticks of the next pose; updated.
     base_pose : array, shape (3,)
@@ -249,8 +249,8 @@ def feed_arm(
     poses_per_link : int
         Regular number of poses per link length of feed.
     step_limit : float
-        Largest movement of any joint between poses; the feed per pose shrinks where needed. Where that does not
-        help, a clamped arm ends there and any other jumps.
+        Largest movement of any joint between poses; the feed per pose shrinks where needed. Where that does
+        not help, a clamped arm ends there and any other jumps.
     n_last : int
         No more poses than these.
     feeds : array, shape (n_max,)
@@ -279,9 +279,7 @@ def feed_arm(
         # A link whose joint is just at the base is still straight in that pose.
         reference = (place - 1) // per_link
         feed = place * terms.length / per_link
-        failed = place_arm(
-            way, new, reference, feed, stride / TICKS, base_pose, terms, walls, blocked, gaps
-        )
+        failed = place_arm(way, new, reference, feed, stride / TICKS, base_pose, terms, walls, blocked, gaps)
         largest, whose = largest_movement(now, new, reference)
         if failed >= 0 or largest > step_limit:
             if stride > 1:

@@ -66,7 +66,7 @@ def closest_path_point(
 
     The link crosses beams. From `first` on, the path point of the tangent point or of the link's start, the
     distance from the crossing to the link's end is looked at; the first one under `near_end` ends the search,
-    at most `reach` path points on. So it stays local: the other leg of a U-turn may be nearer than the own one.
+    at most `reach` path points on. So it stays local: the other leg of a U-turn may be nearer than its own.
     """
     c, s = np.cos(heading), np.sin(heading)
     points = way.lines[POINTS]

@@ -9,14 +9,14 @@ import numpy as np
 from planners.kernels.types import FloatArray
 
 AXIS, TANGENT, EDGE, PATH = 0, 1, 2, 3
-"""What a link does: lie on the feeder's axis, touch the path (3.1), aim at an edge side (3.3), at the path (3.4)."""
+"""What a link does: lie on the feeder's axis, touch the path (3.1), aim at an edge side (3.3), at the path."""
 
 NOTHING, GUIDE_TANGENT, GUIDE_JUMPED = 0, 1, 2
 """What keeps a link from a tangent point (3.6): nothing, or that its guide link is tangent, or has jumped."""
 
 CHOICE, TARGET, CLOSEST, BLOCKED, PIECES = 0, 1, 2, 3, 4
-"""Columns of a record: what a link does; the path point or beam that it aims at; the path point closest to its
-start; what keeps it from a tangent point; how many pieces of a softened jump are still to be made."""
+"""Columns of a record: what a link does; the path point or beam that it aims at; the path point closest to
+its start; what keeps it from a tangent point; how many pieces of a softened jump are still to be made."""
 
 
 POINTS, LEFT, RIGHT = 0, 1, 2
@@ -25,8 +25,8 @@ POINTS, LEFT, RIGHT = 0, 1, 2
 BEAM = np.dtype(
     [("along_x", "f8"), ("along_y", "f8"), ("corner", "i8"), ("next_corner", "i8"), ("next_critical", "i8")]
 )
-"""What belongs to a path point besides its place: the unit vector along the path, the corner in whose run it is,
-and the first corner, the first critical corner, that ends at or after it; -1 is none."""
+"""What belongs to a path point besides its place: the unit vector along the path, the corner in whose run it
+is, and the first corner, the first critical corner, that ends at or after it; -1 is none."""
 
 CORNER = np.dtype([("first", "i8"), ("last", "i8"), ("turn", "i8"), ("critical", "b1")])
 """Of each corner the first and the last path point, +1 for a left one, -1 for a right one, and whether it is
@@ -47,10 +47,11 @@ LINK = np.dtype(
         ("pieces", "f8"),
     ]
 )
-"""A link in one pose, and what it remembers: heading and end; what it does, the path point or beam that it aims
-at, the corner that this is about, or -1, and what keeps it from a tangent point; the path point closest to its
-start; the direction in which it last wanted to point; the corner at which it has jumped and has not yet found a
-tangent point, or -1; and how many pieces of a softened jump are still to be made, in regular poses."""
+"""A link in one pose, and what it remembers: heading and end; what it does, the path point or beam that it
+aims at, the corner that this is about, or -1, and what keeps it from a tangent point; the path point closest
+to its start; the direction in which it last wanted to point; the corner at which it has jumped and has not
+yet found a tangent point, or -1; and how many pieces of a softened jump are still to be made, in regular
+poses."""
 
 Records = Any
 """An array of one of these types, with its fields as attributes. Links are numbered from the tip, as in the
@@ -93,7 +94,7 @@ class Terms(NamedTuple):
     jump : float
         From which change of its aim on a guide link has jumped, in rad.
     degree : float
-        Into how many pieces a sudden jump is divided, one for each regular pose (3.7); 1 is not softened.
+        Into how many pieces a sudden jump is divided, one for each regular pose (3.7).
     clamp : bool
         Whether the direction is clamped into the exact free interval. Not in the paper.
     pad : float
