@@ -58,7 +58,8 @@ class Maze:
     Raises
     ------
     InputError
-        If the free space is empty or invalid, the base or the goal is not in it, or no free way joins them.
+        If the free space is empty or invalid, the base or the goal is not in it, no free way joins them, or
+        the goal reaches the base.
     """
 
     name: str
@@ -86,6 +87,11 @@ class Maze:
             raise InputError(
                 f"Expected a free way from the base to the goal, but ({tip.x:g}, {tip.y:g}) lies in "
                 f"another part of the free space than ({base.x:g}, {base.y:g})."
+            )
+        if base.distance(tip) <= self.goal_radius:
+            raise InputError(
+                f"Expected a goal away from the base, got one whose radius of {self.goal_radius:g} reaches "
+                f"the tip in the feeder: there is nothing to plan."
             )
         object.__setattr__(self, "free_space", orient(_without_collinear_vertices(part)))
         object.__setattr__(self, "base_pose", base_pose)

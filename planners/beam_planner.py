@@ -185,7 +185,11 @@ def plan_beam(query: Query, rules: Rules = CLAMPED) -> Candidate:
         return Candidate(
             status=PlanningStatus.DEAD_END,
             reason=run.reason(query.maze),
-            failure=Failure(place=run.place),
+            failure=Failure(
+                place=run.place,
+                link=None if run.ending == kernel.TOO_LONG else run.link,
+                joints=run.motion(query.maze).joints[-1],
+            ),
             timings={**geometry.timings, "plan": clock[1] - clock[0]},
         )
     motion = run.motion(query.maze)

@@ -86,7 +86,13 @@ def test_nearest_gap_is_moved_beside_the_direction():
 @given(POINTS, st.floats(-math.pi, math.pi), st.integers(0, len(MAZES) - 1))
 def test_rays_end_at_the_first_wall(offset, direction, number):
     maze = list(MAZES.values())[number]()
-    origin = maze.base_pose[:2] + np.array([offset[0], 100.0 + offset[1]])
+    x, y, heading = maze.base_pose
+    ahead = np.array([100.0 + offset[0], 0.8 * offset[1]])
+    origin = np.array([x, y]) + ahead @ [
+        [math.cos(heading), math.sin(heading)],
+        [-math.sin(heading), math.cos(heading)],
+    ]
+    assume(maze.free_space.contains(Point(origin)))
     along = np.array([[math.cos(direction), math.sin(direction)]])
     length = np.empty(1)
     cast_rays(origin[None], along, maze.walls, length)

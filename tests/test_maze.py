@@ -157,6 +157,12 @@ def test_but_the_first_workspace_they_have_light_places_besides_tight_ones(name,
     assert light[0] <= share <= light[1]
 
 
+def test_a_goal_that_reaches_the_base_is_refused():
+    for goal in ((0.0, 5.0), (0.0, 14.0)):
+        with pytest.raises(InputError, match="Expected a goal away from the base, .* radius of 10"):
+            Maze.from_corridors([(0, 0), (0, 500)], 100.0, goal=goal, goal_radius=10.0)
+
+
 @pytest.mark.parametrize("build", [fig17b, fig17c, fig17d])
 def test_our_workspaces_hold_their_goal_and_are_as_large_as_the_first(build):
     maze = build()

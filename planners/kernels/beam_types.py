@@ -9,7 +9,7 @@ import numpy as np
 from planners.kernels.types import FloatArray
 
 AXIS, TANGENT, EDGE, PATH = 0, 1, 2, 3
-"""What a link does: lie on the feeder's axis, touch the path (3.1), aim at an edge side (3.3), at the path."""
+"""What a link does: lie on the feeder's axis, touch the path (3.1), aim at an edge side (3.3) or the path."""
 
 NOTHING, GUIDE_TANGENT, GUIDE_JUMPED = 0, 1, 2
 """What keeps a link from a tangent point (3.6): nothing, or that its guide link is tangent, or has jumped."""
