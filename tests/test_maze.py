@@ -159,7 +159,7 @@ def test_but_the_first_workspace_they_have_light_places_besides_tight_ones(name,
 
 def test_a_goal_that_reaches_the_base_is_refused():
     for goal in ((0.0, 5.0), (0.0, 14.0)):
-        with pytest.raises(InputError, match="Expected a goal away from the base, .* radius of 10"):
+        with pytest.raises(InputError, match=r"Expected a goal away from the base, .* radius of 10"):
             Maze.from_corridors([(0, 0), (0, 500)], 100.0, goal=goal, goal_radius=10.0)
 
 
