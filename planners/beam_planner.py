@@ -7,8 +7,8 @@ section  concept                                    function
 =======  =========================================  ========================================================
 3.1      tangent point                              `tangent_point`
 3.2      closest path point, through the beams      `closest_path_point`
-3.3      closest edge side coordinate               `coordinate_at_length`, of the outer beams' ends
-3.4      path point near semi-critical corners      `is_near_semi_critical`, and 3.3 of the path
+3.3      closest edge side coordinate               `edge_side`
+3.4      path point near semi-critical corners      `path_point`, `is_near_semi_critical`
 3.5      right and left corner                      `planners.corners.turn_of`
 3.6      blocking                                   `blocking`, `remember_jump`
 3.7      softening                                  `soften`
@@ -46,7 +46,9 @@ from planners.kernels.beam_rules import (
     clamp_to_free,
     closest_path_point,
     coordinate_at_length,
+    edge_side,
     is_near_semi_critical,
+    path_point,
     soften,
     tangent_point,
 )
@@ -68,7 +70,9 @@ __all__ = [
     "clamp_to_free",
     "closest_path_point",
     "coordinate_at_length",
+    "edge_side",
     "is_near_semi_critical",
+    "path_point",
     "place_downstream_link",
     "place_reference_link",
     "place_upstream_links",

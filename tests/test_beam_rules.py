@@ -12,7 +12,9 @@ from planners.beam_planner import (
     clamp_to_free,
     closest_path_point,
     coordinate_at_length,
+    edge_side,
     is_near_semi_critical,
+    path_point,
     soften,
     tangent_point,
 )
@@ -163,6 +165,18 @@ def test_the_edge_side_is_at_exactly_the_link_length(length):
 
 def test_no_edge_side_is_found_beyond_the_end():
     assert coordinate_at_length(np.zeros((4, 2)), 0.0, 0.0, 0, 1.0)[0] == -1
+
+
+@pytest.mark.parametrize(("turn", "side"), [(-1, +1), (+1, -1)])
+def test_the_edge_side_of_a_corner_is_the_outer_one(turn, side):
+    bend = way(straight(), [(30, 34, turn, True)], half_width=3.0)
+    beam, direction = edge_side(bend, 0, 0.0, 0.0, 0, 5.0)
+    assert beam == 4 and direction == pytest.approx(side * math.atan2(3.0, 4.0))
+
+
+def test_the_path_point_is_at_the_link_length_or_the_goal():
+    assert path_point(way(straight()), 0.0, 3.0, 0, 5.0) == (4, pytest.approx(math.atan2(-3.0, 4.0)))
+    assert path_point(way(straight()), 30.0, 0.0, 30, 50.0) == (39, 0.0)
 
 
 def test_a_link_is_near_a_semi_critical_corner_that_lies_beside_it():

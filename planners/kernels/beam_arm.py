@@ -14,9 +14,10 @@ from planners.kernels.beam_rules import (
     blocking,
     clamp_to_free,
     closest_path_point,
-    coordinate_at_length,
+    edge_side,
     is_near_semi_critical,
     nearest_index,
+    path_point,
     soften,
     tangent_point,
     turn_between,
@@ -27,12 +28,10 @@ from planners.kernels.beam_types import (
     CHOICE,
     CLOSEST,
     EDGE,
-    LEFT,
     NOTHING,
     PATH,
     PIECES,
     POINTS,
-    RIGHT,
     TANGENT,
     TARGET,
     Records,
@@ -73,16 +72,12 @@ def choose(way: Way, links: Records, k: int, terms: Terms) -> float:
             return float(np.arctan2(points[target, 1] - py, points[target, 0] - px))
     corner = way.beams[index].next_critical
     if corner >= 0:
-        edge = way.lines[LEFT if way.corners[corner].turn < 0 else RIGHT]
-        beam, direction = coordinate_at_length(edge, px, py, index, length)
+        beam, direction = edge_side(way, corner, px, py, index, length)
         if beam >= 0 and not (terms.semi_critical and is_near_semi_critical(way, index, beam)):
             link.choice, link.target, link.corner = EDGE, beam, corner
             return direction
-    target, direction = coordinate_at_length(points, px, py, index, length)
-    if target < 0:  # the goal is nearer than a link
-        target = points.shape[0] - 1
-        direction = np.arctan2(points[target, 1] - py, points[target, 0] - px)
-    link.choice, link.target, link.corner = PATH, target, -1
+    link.choice, link.corner = PATH, -1
+    link.target, direction = path_point(way, px, py, index, length)
     return direction
 
 

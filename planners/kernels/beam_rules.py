@@ -105,9 +105,8 @@ def coordinate_at_length(
 ) -> tuple[int, float]:
     """Find the first place on a line, from an index on, at distance `length` from p (sections 3.3, 3.4).
 
-    With the ends of the outer beams as line this is the closest edge side coordinate; with the path points,
-    the closest path point coordinate. The paper takes the first point at or beyond the distance. Between
-    two points we interpolate: from point to point the direction jumps, and the links poke the walls.
+    The paper takes the first point at or beyond the distance. Between two points we interpolate: from
+    point to point the direction jumps, and the links poke the walls.
 
     Returns
     -------
@@ -129,6 +128,30 @@ def coordinate_at_length(
             bx, by = ax + t * ex, ay + t * ey
         return i, np.arctan2(by, bx)
     return -1, 0.0
+
+
+@njit(cache=True)
+def edge_side(way: Way, corner: int, px: float, py: float, index: int, length: float) -> tuple[int, float]:
+    """Find the closest edge side coordinate (3.3): on the left of a right corner, and conversely (3.5).
+
+    Returns the beam and the direction, as `coordinate_at_length` does of the beams' ends.
+    """
+    side = LEFT if way.corners[corner].turn < 0 else RIGHT
+    return coordinate_at_length(way.lines[side], px, py, index, length)
+
+
+@njit(cache=True)
+def path_point(way: Way, px: float, py: float, index: int, length: float) -> tuple[int, float]:
+    """Find the closest path point coordinate (section 3.4), or the goal if that is nearer than a link.
+
+    Returns the path point and the direction, as `coordinate_at_length` does of the path.
+    """
+    points = way.lines[POINTS]
+    target, direction = coordinate_at_length(points, px, py, index, length)
+    if target >= 0:
+        return target, direction
+    last = points.shape[0] - 1
+    return last, np.arctan2(points[last, 1] - py, points[last, 0] - px)
 
 
 @njit(cache=True)
