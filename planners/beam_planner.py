@@ -130,7 +130,7 @@ class Rules:
     semi_critical : bool
         Whether links take path points near semi-critical corners (3.4).
     tangent_blocks : bool
-        Whether a link is kept from tangent points at a corner while its guide link is tangent to it (3.6).
+        Whether a link is kept from tangent points while its guide link is tangent to the path (3.6).
     jump_blocks : bool
         Whether a link is kept from them from a jump of its guide link until that is tangent (3.6).
     softening_degree : int

@@ -208,13 +208,13 @@ def test_a_bend_to_the_left_is_a_left_corner_however_it_is_turned(bend, heading)
     ("choice", "corner", "jumped", "expected"),
     [
         (TANGENT, 2, -1, GUIDE_TANGENT),
-        (TANGENT, 1, -1, NOTHING),
+        (TANGENT, 1, -1, GUIDE_TANGENT),
         (EDGE, 2, -1, NOTHING),
         (EDGE, 2, 2, GUIDE_JUMPED),
         (EDGE, 1, 1, NOTHING),
     ],
 )
-def test_a_guide_link_blocks_while_it_is_tangent_or_has_jumped_at_the_same_corner(
+def test_a_guide_link_blocks_while_it_is_tangent_and_at_the_corner_where_it_has_jumped(
     choice, corner, jumped, expected
 ):
     arm = links()

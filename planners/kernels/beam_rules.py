@@ -170,11 +170,11 @@ def blocking(links: Records, k: int, corner: int, terms: Terms) -> int:
     """Tell what keeps a link from a tangent point at a corner: its guide link (section 3.6), or nothing.
 
     The guide link is the next one towards the tip, in its state of the last pose. It blocks while it is
-    tangent to the same corner, and from a jump above the threshold until it finds a tangent point.
+    tangent to the path, and at the corner where it has jumped, until it finds a tangent point there.
     """
     if k > 0:
         guide = links[k - 1]
-        if terms.tangent_blocks and guide.choice == TANGENT and guide.corner == corner:
+        if terms.tangent_blocks and guide.choice == TANGENT:
             return GUIDE_TANGENT
         if terms.jump_blocks and guide.jumped == corner:
             return GUIDE_JUMPED
