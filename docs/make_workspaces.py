@@ -19,9 +19,9 @@ from hrsnake_env.arm import ArmSpec
 from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import PAPER_LINK_LENGTHS
-from hrsnake_env.rendering import COLOURS, MazePicture
+from hrsnake_env.rendering import MazePicture
 from planners import Motion, plan, rod_bound
-from planners.figures import draw_beams, draw_path
+from planners.figures import draw_beams, draw_path, draw_stages
 from planners.rollout import Episode, simulate_motion
 from planners.survey import Geometry, survey
 
@@ -30,9 +30,6 @@ WIDTH, DPI, GAP = 1400, 105, 8
 """Of the picture in pixels, pixels per inch, and pixels between its panels."""
 
 PANELS = (("fig17a", "fig17b"), ("fig17c", "fig17d"))
-POSES = ((0.35, "#d6336c"), (0.65, "#8e44ad"), (1.0, COLOURS["arm"]))
-"""Poses that are drawn: their share of the motion, and their colour."""
-
 EVERY = 5
 """One of so many beams is drawn."""
 
@@ -109,14 +106,10 @@ def panel(space: Workspace, height: float) -> NDArray[np.uint8]:
     letter, links = space.name[-1], space.motion.n_links
     title = f"{letter}: {links} links of {space.arm.link_length:g} px"
     picture = MazePicture(space.maze, height=height, dpi=DPI, title=title)
-    joints = space.episode.joints
     if letter == "a":  # as in the paper; elsewhere they would hide the halls
         draw_beams(picture.axes, space.geometry.beams, every=EVERY)
     draw_path(picture.axes, space.geometry.path, linewidth=0.9, zorder=3)
-    for share, colour in POSES:
-        pose = joints[round(share * (len(joints) - 1))]
-        picture.add_arm(pose, colour=colour)
-        picture.axes.plot(*pose[-1], "o", color=colour, markersize=6, markeredgecolor="white", zorder=8)
+    draw_stages(picture.axes, space.episode.joints)
     return picture.rgb()
 
 

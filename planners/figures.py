@@ -6,8 +6,11 @@ from collections.abc import Collection, Iterable
 from typing import Any
 
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path as Outline
 from numpy.typing import ArrayLike
@@ -15,26 +18,45 @@ from numpy.typing import ArrayLike
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.maze import Maze
 from hrsnake_env.rendering import COLOURS, ArmDrawing
+from planners.beam_planner import CHOICES
 from planners.beams import Beams
 from planners.corners import Corner
+from planners.kernels.beam_types import AXIS, EDGE, PATH, TANGENT
+from planners.kernels.types import IntArray
 from planners.path import Path
+from planners.problem import Motion
 
 __all__ = [
+    "CHOICE_COLOURS",
     "GREEN",
     "RED",
+    "STAGES",
     "STYLE",
+    "choice_handles",
     "draw_arm",
+    "draw_arrow",
     "draw_beams",
+    "draw_choices",
     "draw_ends",
     "draw_path",
+    "draw_relay",
     "draw_rings",
+    "draw_stages",
     "draw_walls",
+    "evenly_fed",
     "mark_corner",
+    "wall_depths",
     "zoom",
 ]
 
 GREEN, RED = "#1a9850", "#d73027"
 """The paper's colours of the left and the right beams."""
+
+CHOICE_COLOURS = {AXIS: "#8a9099", TANGENT: "#1f5fae", EDGE: "#e67700", PATH: "#8e44ad"}
+"""Colours of links by what they do, by its number in the record of a run."""
+
+STAGES = ((0.35, "#d6336c"), (0.65, "#8e44ad"), (1.0, COLOURS["arm"]))
+"""Poses of a motion that are drawn together: their share of the motion, and their colour."""
 
 STYLE: dict[str, Any] = {
     "figure.constrained_layout.use": True,
@@ -185,3 +207,111 @@ def draw_arm(
     arm = ArmDrawing(axes, colour, alpha)
     arm.move(joints, pinched, collided)
     return arm
+
+
+def draw_stages(axes: Axes, joints: FloatArray) -> None:
+    """Draw the arm at the `STAGES` of a motion, joints of shape (n_poses, n_links + 1, 2); dots mark tips."""
+    for share, colour in STAGES:
+        pose = joints[round(share * (len(joints) - 1))]
+        draw_arm(axes, pose, colour=colour)
+        axes.plot(*pose[-1], "o", color=colour, markersize=6, markeredgecolor="white", zorder=8)
+
+
+def draw_choices(
+    axes: Axes, ends: FloatArray, choices: ArrayLike, linewidth: float = 3.0, alpha: float = 1.0
+) -> None:
+    """Draw links in the colours of what they do.
+
+    Parameters
+    ----------
+    axes : matplotlib Axes
+        Where to draw.
+    ends : array, shape (n_links + 1, 2)
+        Joint positions, the tip first, in maze units.
+    choices : array-like, shape (n_links or more,)
+        What each link does, the tip's first, as in the record of a run.
+    linewidth : float
+        In points.
+    alpha : float
+        1 is opaque.
+    """
+    lines = np.stack([ends[1:], ends[:-1]], axis=1)
+    colours = [CHOICE_COLOURS[int(choice)] for choice in np.asarray(choices)[: len(lines)]]
+    axes.add_collection(
+        LineCollection(
+            list(lines), colors=colours, linewidths=linewidth, alpha=alpha, capstyle="round", zorder=4
+        )
+    )
+    axes.plot(*ends.T, "o", color=COLOURS["joint"], markersize=1.3 * linewidth, alpha=alpha, zorder=5)
+
+
+def choice_handles() -> list[Line2D]:
+    """Return what a legend needs to name the colours of `draw_choices`."""
+    return [Line2D([], [], color=CHOICE_COLOURS[k], linewidth=3.0, label=name) for k, name in CHOICES.items()]
+
+
+def draw_relay(axes: Axes, feed: FloatArray, choices: ArrayLike) -> None:
+    """Draw what each link does, shape (n_poses, n_links), over the feed, shape (n_poses,); links are rows."""
+    rows = np.asarray(choices).T
+    n_links = len(rows)
+    borders = np.append(feed, feed[-1])
+    colours = ListedColormap([CHOICE_COLOURS[k] for k in sorted(CHOICE_COLOURS)])
+    norm = BoundaryNorm(np.arange(len(CHOICE_COLOURS) + 1) - 0.5, len(CHOICE_COLOURS))
+    axes.pcolormesh(borders, np.arange(n_links + 1) + 0.5, rows, cmap=colours, norm=norm)
+    axes.hlines(np.arange(1, n_links) + 0.5, feed[0], feed[-1], color="white", linewidth=2.0)
+    axes.set_ylim(n_links + 0.5, 0.5)
+    axes.set_yticks(range(1, n_links + 1))
+    axes.set_ylabel("link, from the tip")
+
+
+def draw_arrow(axes: Axes, start: ArrayLike, end: ArrayLike, colour: str, linewidth: float = 1.4) -> None:
+    """Draw a vector from one place to another."""
+    look = {"arrowstyle": "-|>", "color": colour, "linewidth": linewidth, "shrinkA": 0.0, "shrinkB": 0.0}
+    tail, head = (tuple(np.asarray(place, dtype=np.float64).tolist()) for place in (start, end))
+    axes.annotate("", head, xytext=tail, arrowprops=look, zorder=7)
+
+
+def evenly_fed(feed: FloatArray, spacing: float) -> IntArray:
+    """Return poses at even spacing of the feed, shape (n_poses,): where joints move fast there are more."""
+    return np.searchsorted(feed, np.arange(feed[0], feed[-1], spacing))
+
+
+def wall_depths(motion: Motion, maze: Maze, poses: IntArray | None = None, samples: int = 65) -> FloatArray:
+    """Compute how deep each link is in the walls at each pose, for pictures: the checker has the last word.
+
+    Parameters
+    ----------
+    motion : Motion
+        Valid or not.
+    maze : Maze
+        With the exact walls.
+    poses : array of int, shape (n,), optional
+        Look at these poses only.
+    samples : int
+        Evenly spaced points on a link at which depth is looked at.
+
+    Returns
+    -------
+    depths : array, shape (n_poses or n, n_links)
+        Of links from the tip, in maze units; 0 where a link is free. Of links in the feeder, what is past the
+        base counts.
+    """
+    feed, joints = (
+        (motion.feed, motion.joints) if poses is None else (motion.feed[poses], motion.joints[poses])
+    )
+    arc = feed[:, None] - (motion.n_links - np.arange(motion.n_links + 1)) * motion.link_length
+    joints = np.where(arc[..., None] < 0.0, motion.base_pose[:2], joints)
+    pose, link = np.nonzero(arc[:, 1:] > 1e-9 * motion.link_length)
+    starts, ends = joints[pose, link], joints[pose, link + 1]
+    lines = shapely.linestrings(np.stack([starts, ends], axis=1))
+    outside = np.flatnonzero(~shapely.covers(maze.free_space, lines))
+    shares = np.linspace(0.0, 1.0, samples)[:, None]
+    walls, along = maze.walls[:, 0], maze.walls[:, 1] - maze.walls[:, 0]
+    depths = np.zeros((len(feed), motion.n_links))
+    for k in outside:
+        points = starts[k] + shares * (ends[k] - starts[k])
+        offset = points[~shapely.intersects_xy(maze.free_space, points)][:, None] - walls
+        nearest = np.clip(np.sum(offset * along, axis=2) / np.sum(along**2, axis=1), 0.0, 1.0)
+        distances = np.linalg.norm(offset - nearest[..., None] * along, axis=2)
+        depths[pose[k], link[k]] = distances.min(axis=1).max(initial=0.0)
+    return depths[:, ::-1]
