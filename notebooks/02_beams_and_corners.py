@@ -11,22 +11,20 @@
 # ---
 
 # %% [markdown]
-
-# %% [markdown]
-# # Figs. 2, 3 and 11: beams, and the corners that they find
+# # Figs. 2, 3, 4 and 11: beams, and the corners that they find
 #
 # From each point of the path two *beams* go out at right angles until they meet a wall: a green one to the
-# left and a red one to the right, as seen on the way to the goal (Fig. 2 of the paper). Where the path bends
-# sharply *and* the beam on the inner side of the bend is short, there is a *critical corner* (Fig. 3): a
-# place at which links have to be careful. They go round a left corner otherwise than round a right one, so
-# each corner gets its side (section 3.5, Fig. 11).
+# left and a red one to the right, as seen on the way to the goal (Fig. 2 of the paper). Where the path
+# bends sharply *and* the beam on the inner side of the bend is short, there is a *critical corner* (Fig.
+# 3): a place at which links have to be careful. They go round a left corner otherwise than round a right
+# one, so each corner gets its side (section 3.5, Fig. 11).
 
 # %%
 import matplotlib.pyplot as plt
 import numpy as np
 
 from hrsnake_env import Maze
-from planners.corners import MAX_INNER_BEAM, MIN_CURVATURE
+from planners.corners import MAX_INNER_BEAM, MIN_CURVATURE, SEMI_MAX_INNER_BEAM, SEMI_MIN_CURVATURE
 from planners.figures import (
     GREEN,
     RED,
@@ -43,6 +41,7 @@ from planners.survey import survey
 plt.rcParams.update(STYLE)
 BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.9, "pad": 1.5}
 MIDDLE = {"textcoords": "offset points", "ha": "center", "va": "center", "zorder": 9}
+KIND = {True: "#c2410c", False: "#2563a8"}  # critical, semi-critical
 NOTE = {"weight": "bold", "fontsize": 8.5, "bbox": BOX, **MIDDLE}
 
 turns = Maze.load("zig3")
@@ -86,10 +85,10 @@ plt.show()
 # ## Fig. 3: critical corners
 #
 # In a hall full of pillars, what the detection sees along the whole way: the curvature of the path, and the
-# length of the beam on the inner side of the bend. Where both are beyond their thresholds (dashed), the path
-# points make up a critical corner (shaded in its colour). Either alone would not do: short beams are
-# everywhere in a narrow straight corridor, and a sharp bend in the open (shaded in grey) needs no care.
-# (In the picture beams are cut to 1.2 passage widths.)
+# length of the beam on the inner side of the bend. Where both are beyond their thresholds (dashed), the
+# path points make up a critical corner (shaded in its colour). Either alone would not do: short beams are
+# everywhere in a narrow straight corridor, and a sharp bend in the open (shaded in grey) needs no care. (In
+# the picture beams are cut to 1.2 passage widths.)
 
 # %%
 hall = Maze.load("clutter-147")
@@ -130,6 +129,53 @@ plt.show()
 # The inner beam jumps where the path changes from bending one way to bending the other, as the inner side
 # is the other one then.
 #
+# ## Fig. 4: semi-critical corners
+#
+# Slighter bends, farther from the wall, have thresholds of their own: half the curvature, a longer beam.
+# The paper gives no numbers for either kind; these are ours. A corner that is beyond both pairs of
+# thresholds is critical, and the slight bends at its flanks belong to it. In this corridor both kinds
+# occur.
+
+# %%
+corridor = Maze.load("corridor-21")
+view = survey(corridor)
+path, beams = view.path, view.beams
+s, bend = path.s / path.width, np.abs(path.curvature) * path.width
+inner = np.where(path.curvature > 0.0, beams.left_lengths, beams.right_lengths) / path.width
+both = sorted([*view.corners, *view.semi_critical], key=lambda corner: corner.first)
+
+figure, panels = plt.subplot_mosaic(
+    [["map", "bend"], ["map", "beam"]], figsize=(10.0, 6.0), width_ratios=(1, 2)
+)
+place, curvature, beam = panels["map"], panels["bend"], panels["beam"]
+draw_walls(place, corridor)
+place.margins(0.01)
+draw_beams(place, beams, every=4, longest=1.2 * path.width, linewidth=0.4)
+draw_path(place, path)
+draw_ends(place, corridor)
+for number, corner in enumerate(both, 1):
+    mark_corner(place, path, corner, label=f"{number}" if corner.critical else f"{number} semi")
+    run = slice(corner.first, corner.last + 1)
+    for axes in (curvature, beam):
+        axes.axvspan(*s[[corner.first, corner.last]], color=KIND[corner.critical], alpha=0.3, linewidth=0.0)
+    curvature.annotate(f"{number}", (s[run].mean(), 2.5), xytext=(0, 0), **NOTE)
+    kind = "critical" if corner.critical else "semi-critical"
+    print(f"{number}, {kind}, {corner.name}: curvature {bend[run].max():.2f}, beam {inner[run].min():.2f}")
+levels = {True: (MIN_CURVATURE, MAX_INNER_BEAM), False: (SEMI_MIN_CURVATURE, SEMI_MAX_INNER_BEAM)}
+for axes, values, which in ((curvature, bend, 0), (beam, inner, 1)):
+    axes.plot(s, values, color="black", linewidth=1.3)
+    for critical, kind in ((True, "critical"), (False, "semi-critical")):
+        level = levels[critical][which]
+        word = "below" if which else "beyond"
+        look = {"color": KIND[critical], "linestyle": "--", "label": f"{kind}: {word} {level}"}
+        axes.axhline(level, linewidth=1.3, **look)
+    axes.set_xlim(0.0, s[-1])
+    axes.legend(loc="upper center", ncols=2)
+curvature.set(ylim=(0.0, 3.6), ylabel="|curvature| x width")
+beam.set(ylim=(0.0, 1.4), ylabel="inner beam\n(passage widths)", xlabel="arclength (passage widths)")
+plt.show()
+
+# %% [markdown]
 # ## Fig. 11: right or left
 #
 # Section 3.5 draws two vectors between path points inside the corner and multiplies them. The sign of their
