@@ -35,6 +35,16 @@ def test_a_notebooks_title_names_a_figure_of_the_paper(path):
     assert re.match(r"# # Figs?\. \d+", title), title
 
 
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_the_index_names_every_notebook_with_its_figures(path):
+    title = next(line for line in path.read_text().splitlines() if line.startswith("# # ")).partition(":")[0]
+    first, last = (int(figure) for figure in (re.findall(r"\d+", title)[0], re.findall(r"\d+", title)[-1]))
+    lines = (ROOT / "notebooks" / "README.md").read_text().splitlines()
+    row = next(line for line in lines if f"[{path.stem}]({path.name})" in line)
+    listed = [int(figure) for figure in re.findall(r"\d+", row.split("|")[1])]
+    assert listed[0] == first and listed[-1] == last
+
+
 def test_a_cell_that_fails_fails_the_notebook(tmp_path):
     failing = tmp_path / "failing.py"
     failing.write_text("# %%\nimport numpy as np\n\n# %%\nassert np.pi > 4, 'not that large'\n")
