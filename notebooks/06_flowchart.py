@@ -148,8 +148,8 @@ STEPS = (  # column and row, width, part, text
     ("goal", 4.2, 12, 3.6, "end", "keep the pose. Is the tip at the goal?"),
 )
 WAYS = (  # from, to, label
-    ("feed", "A", ""), ("A", "C", ""), ("C", "next", ""), ("next", "closest", ""), ("closest", "tangent?", ""),
-    ("tangent?", "blocked?", "yes"), ("tangent?", "edge?", "no"),
+    ("feed", "A", ""), ("A", "C", ""), ("C", "next", ""), ("next", "closest", ""),
+    ("closest", "tangent?", ""), ("tangent?", "blocked?", "yes"), ("tangent?", "edge?", "no"),
     ("blocked?", "edge?", "yes"), ("blocked?", "tangent", "no"),
     ("edge?", "edge", "yes"), ("edge?", "path", "no"),
     ("path", "soften", ""), ("edge", "soften", ""), ("tangent", "soften", ""),

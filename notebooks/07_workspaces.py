@@ -90,7 +90,7 @@ def shown(axes, name, rules, title):
     draw_path(axes, surveys[name].path, linewidth=0.7)
     draw_ends(axes, maze)
     draw_choices(axes, motion.joints[pose, ::-1], run.record[pose, :, CHOICE], linewidth=2.4)
-    where = "at the goal" if run.ending == GOAL else f"stopped, {run.n_links} links out"
+    where = "reaches the goal" if run.ending == GOAL else f"stops, {run.n_links} links out"
     if deepest > 1e-3 * run.link_length:
         link = int(np.argmax(depths[row]))
         ring = motion.joints[pose, ::-1][link : link + 2].mean(axis=0)
@@ -98,7 +98,7 @@ def shown(axes, name, rules, title):
     if run.ending != GOAL:
         axes.plot(*run.place, "X", color="#d62828", markeredgecolor="white", markersize=12, zorder=9)
         print(f"{name}, {title}: {run.reason(maze)}")
-    axes.set_title(f"{name[-1]}, {title}: {where}, depth {deepest:.1f} px")
+    axes.set_title(f"{name[-1]}, {title}: {where}, deepest {deepest:.1f} px")
     print(f"{name}, {title}: {where} after {run.feeds[-1]:.0f} px of feed, deepest {deepest:.2f} px")
 
 
