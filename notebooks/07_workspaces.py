@@ -110,7 +110,8 @@ for rules, title in ((AS_PRINTED, "as printed"), (CLAMPED, "clamped")):
     plt.show()
 
 # %% [markdown]
-# As printed, the rules bring the arm to the goal in all four, but in none without going through walls.
+# As printed, the rules bring the arm to the goal in all four, but in none without going through walls; in a
+# most deeply at the very end, where the goal is nearer than a link's length and the tip swings past it.
 # Clamped, they solve b and c without touching more than the surface. In a the clamped arm stops behind the
 # fourth U-turn, and in d in the crack: there a wall would make the tip's link jump. That is what the other
 # planners are for.
