@@ -260,14 +260,35 @@ def bench_speed_command(
 ) -> None:
     """Measure speed and scale: stages, growth, memory, first call, random mazes, and OMPL beside."""
     from planners.bench import speed
+    from planners.bench.records import write_results
     from planners.bench.speed_tables import speed_markdown
 
     _check_output(out, (".json",))
     chosen = tuple(part.strip() for part in parts.split(",")) if parts else speed.PARTS
     results = speed.run_speed(speed.QUICK if quick else speed.FULL, parts=chosen, quiet=as_json)
     if out is not None:
-        speed.write_speed(results, out)
+        write_results(results, out)
     _print(as_json, results, lambda: print(speed_markdown(results)))
+
+
+@bench_app.command("paper")
+def bench_paper_command(
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer lengths and mazes: under a minute.")] = False,
+    parts: Annotated[str, typer.Option("--parts", help="Some of the parts, as poses,index.")] = "",
+    out: Annotated[Path | None, typer.Option("--out", help="Write all figures (.json).")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure the paper's results: workspaces, time per pose, growth, index, families, and its rules."""
+    from planners.bench import paper
+    from planners.bench.paper_tables import paper_markdown
+    from planners.bench.records import write_results
+
+    _check_output(out, (".json",))
+    chosen = tuple(part.strip() for part in parts.split(",")) if parts else paper.PARTS
+    results = paper.run_paper(paper.QUICK if quick else paper.FULL, parts=chosen, quiet=as_json)
+    if out is not None:
+        write_results(results, out)
+    _print(as_json, results, lambda: print(paper_markdown(results)))
 
 
 def main() -> None:

@@ -16,7 +16,8 @@ from planners.baselines.ompl_sampling import FedArm, plan_ompl
 from planners.bench.beside import beside_ompl, ompl_tasks, run_one, u_turns
 from planners.bench.fits import exponent
 from planners.bench.pool import resumed
-from planners.bench.speed import PARTS, QUICK, run_speed, write_speed
+from planners.bench.records import write_results
+from planners.bench.speed import PARTS, QUICK, run_speed
 from planners.bench.speed_tables import speed_markdown
 from planners.query import Query
 from planners.validation import validate
@@ -59,7 +60,7 @@ def test_a_part_that_is_not_there_is_named():
 
 def test_results_are_written_whole(tmp_path):
     results = run_speed(TINY, parts=(), quiet=True)
-    write_speed(results, tmp_path / "speed.json")
+    write_results(results, tmp_path / "speed.json")
     assert json.loads((tmp_path / "speed.json").read_text()) == results
 
 

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import os
-import platform
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from hrsnake_env.errors import InputError
-from hrsnake_env.files import replacing
 from planners.baselines.ompl_sampling import is_installed
 from planners.bench.beside import beside_ompl, ompl_tasks
 from planners.bench.many import ROUNDS, random_mazes
 from planners.bench.pool import bar
+from planners.bench.records import check_parts, load, machine
 from planners.bench.single import PLANNERS, first_calls, growth_with_links, growth_with_way, memory, stages
 
-__all__ = ["FULL", "PARTS", "QUICK", "Sizes", "machine", "run_speed", "write_speed"]
+__all__ = ["FULL", "PARTS", "QUICK", "Sizes", "run_speed"]
 
 PARTS = ("stages", "links", "way", "memory", "first call", "random mazes", "ompl")
 """What can be measured, in the order in which it is."""
@@ -122,8 +118,7 @@ def run_speed(
     InputError
         If there is no such part.
     """
-    if unknown := [part for part in parts if part not in PARTS]:
-        raise InputError(f"Unknown part {unknown[0]!r}. Available: {', '.join(PARTS)}.")
+    check_parts(parts, PARTS)
     count = os.cpu_count() or 1 if workers is None else workers
     start = time.perf_counter()
     results: dict[str, Any] = {"machine": machine(), "workers": count}
@@ -131,25 +126,8 @@ def run_speed(
         if part in parts:
             results[part] = _measure(part, sizes, count, quiet)
     results["seconds"] = time.perf_counter() - start
-    results["load_at_end"] = _load()
+    results["load_at_end"] = load()
     return results
-
-
-def write_speed(results: dict[str, Any], path: Path) -> None:
-    """Write the results as JSON, completely or not at all."""
-    with replacing(path) as part:
-        part.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-
-
-def machine() -> dict[str, Any]:
-    """Name the machine, and how busy it is."""
-    return {
-        "platform": platform.platform(),
-        "processor": _processor(),
-        "cores": os.cpu_count(),
-        "python": platform.python_version(),
-        "load": _load(),
-    }
 
 
 def _measure(part: str, sizes: Sizes, workers: int, quiet: bool) -> Any:
@@ -184,16 +162,3 @@ def _beside(sizes: Sizes, workers: int, quiet: bool) -> dict[str, Any] | None:
     tasks = ompl_tasks(sizes.ompl_turns, sizes.ompl_indices, seeds, sizes.ompl_seconds)
     with bar("ompl", len(tasks), quiet) as tell:
         return {"seconds": sizes.ompl_seconds, "rows": beside_ompl(tasks, workers, tell)}
-
-
-def _processor() -> str:
-    """Return the processor's name where the system tells it."""
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as file:
-            return next(line.split(":")[1].strip() for line in file if line.startswith("model name"))
-    except (OSError, StopIteration):
-        return platform.processor() or platform.machine()
-
-
-def _load() -> list[float] | None:
-    return list(os.getloadavg()) if hasattr(os, "getloadavg") else None

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
+from planners.bench.markdown import measured_on, milliseconds, table
+
 __all__ = ["speed_markdown"]
 
 STAGES = ("potential", "path", "beams", "plan", "poses", "maze to poses", "validate")
@@ -21,28 +23,11 @@ def speed_markdown(results: Mapping[str, Any]) -> str:
         "random mazes": _random_mazes,
         "ompl": _ompl,
     }
-    machine = results["machine"]
-    load, later = machine["load"], results["load_at_end"]
-    busy = f", load {load[0]:.1f} at the start and {later[0]:.1f} at the end" if load and later else ""
-    lines = [
-        f"Measured in one run of {results['seconds']:.0f} s on {machine['cores']} cores of "
-        f"{machine['processor']} ({machine['platform']}), Python {machine['python']}{busy}."
-    ]
+    lines = [measured_on(results)]
     for part, write in writers.items():
         if part in results:
             lines += ["", *write(results[part])]
     return "\n".join(lines)
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    yield "| " + " | ".join(head) + " |"
-    yield "|---" * len(head) + "|"
-    for row in rows:
-        yield "| " + " | ".join(row) + " |"
-
-
-def _ms(seconds: float) -> str:
-    return f"{seconds * 1e3:.3g} ms"
 
 
 def _stages(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
@@ -56,13 +41,13 @@ def _stages(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
             f"{row['runs']} runs:"
         )
         yield ""
-        yield from _table(
+        yield from table(
             ("stage", "median", "least", "median per pose"),
             [
                 (
                     stage,
-                    _ms(row["median_s"][stage]),
-                    _ms(row["least_s"][stage]),
+                    milliseconds(row["median_s"][stage]),
+                    milliseconds(row["least_s"][stage]),
                     f"{row['median_s'][stage] / row['n_poses'] * 1e6:.3g} us",
                 )
                 for stage in STAGES
@@ -72,7 +57,7 @@ def _stages(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
 
 
 def _growth(what: str, data: Mapping[str, Any]) -> Iterator[str]:
-    yield from _table(
+    yield from table(
         (
             "link",
             "planner",
@@ -108,9 +93,9 @@ def _growth_row(row: Mapping[str, Any]) -> tuple[str, ...]:
         f"{row['path_length']:.0f}",
         str(row["n_links"]),
         str(row["n_poses"]),
-        *(_ms(least[stage]) for stage in ("maze to poses", "plan", "poses")),
+        *(milliseconds(least[stage]) for stage in ("maze to poses", "plan", "poses")),
         f"{least['maze to poses'] / row['n_poses'] * 1e6:.3g} us",
-        _ms(least["validate"]),
+        milliseconds(least["validate"]),
     )
 
 
@@ -133,7 +118,7 @@ def _way(data: Sequence[Mapping[str, Any]]) -> Iterator[str]:
 def _memory(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     yield "**Memory**, each in a fresh process:"
     yield ""
-    yield from _table(
+    yield from table(
         ("maze", "links", "poses", "after imports", "at the peak"),
         [
             (
@@ -160,7 +145,7 @@ def _first_call(data: Mapping[str, Any]) -> Iterator[str]:
 def _random_mazes(data: Mapping[str, Any]) -> Iterator[str]:
     yield f"**Random mazes**, at most {data['time_budget_s']:g} s each, every motion validated:"
     yield ""
-    yield from _table(
+    yield from table(
         ("mazes", "link", "number", "solved", "no rod passes", "unsolved", "median of the solved"),
         [
             (
@@ -194,7 +179,7 @@ def _ompl(data: Mapping[str, Any] | None) -> Iterator[str]:
         "rod; OMPL is given the number of links and whole arms at the goal:"
     )
     yield ""
-    yield from _table(
+    yield from table(
         ("U-turns", "I", "links", "planner", "runs", "valid", "invalid", "unsolved", "median of the valid"),
         [
             (

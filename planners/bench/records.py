@@ -1,0 +1,58 @@
+"""What every benchmark says besides its figures: machine, load, known parts; and the file of its results."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from hrsnake_env.errors import InputError
+from hrsnake_env.files import replacing
+
+__all__ = ["check_parts", "load", "machine", "write_results"]
+
+
+def check_parts(parts: Sequence[str], known: Sequence[str]) -> None:
+    """Refuse parts that are not there.
+
+    Raises
+    ------
+    InputError
+        If there is no such part.
+    """
+    if unknown := [part for part in parts if part not in known]:
+        raise InputError(f"Unknown part {unknown[0]!r}. Available: {', '.join(known)}.")
+
+
+def machine() -> dict[str, Any]:
+    """Name the machine, and how busy it is."""
+    return {
+        "platform": platform.platform(),
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "python": platform.python_version(),
+        "load": load(),
+    }
+
+
+def load() -> list[float] | None:
+    """Return how many processes wanted to run in the last 1, 5 and 15 minutes, where the system tells it."""
+    return list(os.getloadavg()) if hasattr(os, "getloadavg") else None
+
+
+def write_results(results: dict[str, Any], path: Path) -> None:
+    """Write results as JSON, completely or not at all."""
+    with replacing(path) as part:
+        part.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+
+
+def _processor() -> str:
+    """Return the processor's name where the system tells it."""
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as file:
+            return next(line.split(":")[1].strip() for line in file if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor() or platform.machine()
