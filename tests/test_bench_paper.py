@@ -176,7 +176,7 @@ def test_the_longest_link_of_a_family_passes_and_is_validated():
 
 
 def test_rows_are_in_the_order_of_their_tasks_in_one_process_and_in_many():
-    tasks = [("fig19", length, "follow") for length in (430.0, 150.0, 200.0)]
+    tasks = [("fig19", length, "follow", True) for length in (430.0, 150.0, 200.0)]
     assert trials(tasks, 0) == trials(tasks, 2)
 
 

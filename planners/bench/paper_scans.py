@@ -75,12 +75,12 @@ def _seen(name: str) -> tuple[Maze, Geometry | None]:
     return maze, survey(maze)
 
 
-def try_length(name: str, link_length: float, planner: str) -> dict[str, Any]:
-    """Try one planner, or variant of the rules, at one length."""
+def try_length(name: str, link_length: float, planner: str, depths: bool = True) -> dict[str, Any]:
+    """Try one planner, or variant of the rules, at one length; see `try_planner`."""
     maze, geometry = _seen(name)
-    trial = try_planner(maze, link_length, VARIANTS.get(planner, planner), geometry)
+    trial = try_planner(maze, link_length, VARIANTS.get(planner, planner), geometry, depths=depths)
     return {
-        "task": [name, link_length, planner],
+        "task": [name, link_length, planner, depths],
         "maze": name,
         "link_length": link_length,
         "planner": planner,
@@ -89,7 +89,7 @@ def try_length(name: str, link_length: float, planner: str) -> dict[str, Any]:
 
 
 def trials(
-    tasks: Sequence[tuple[str, float, str]], workers: int, tell: Tell = lambda: None
+    tasks: Sequence[tuple[str, float, str, bool]], workers: int, tell: Tell = lambda: None
 ) -> list[dict[str, Any]]:
     """Try many lengths over processes (0: in this one); rows are in the order of the tasks."""
     return _in_order(try_length, tasks, workers, tell)
@@ -125,8 +125,8 @@ def index_over_lengths(
     tell : callable
         Called after each try.
     """
-    tasks = [("fig19", length, planner) for planner in INDEX_PLANNERS for length in lengths]
-    tasks += [("fig19", length, planner) for planner in ("as-printed", "beam", "follow") for length in shown]
+    tasks = [("fig19", length, planner, length in shown) for planner in INDEX_PLANNERS for length in lengths]
+    tasks += [("fig19", length, planner, True) for planner in FAMILY_PLANNERS for length in shown]
     rows = trials(list(dict.fromkeys(tasks)), workers, tell)
     scanned = set(lengths)
     return {
@@ -194,10 +194,12 @@ def scan_family(name: str, planner: str, step: float, coarse: float) -> dict[str
     rod, closed = family_rod(name)
     shares = np.round(np.arange(1.0, SHORTEST - 1e-9, -step), 9)
     # Just below the rod's length: at the length itself it is pinched everywhere.
-    longest = next((share for share in shares if _passes(name, share * rod * (1.0 - 1e-9), planner)), None)
+    longest = next(
+        (share for share in shares if _outcome(name, share * rod * (1.0 - 1e-9), planner) == "solved"), None
+    )
     grid = np.round(np.arange(1.0, SHORTEST - 1e-9, -coarse), 9)
     shorter = [float(share) for share in grid if longest is not None and share < longest]
-    passed = [share for share in shorter if _passes(name, share * rod, planner)]
+    outcomes = [_outcome(name, share * rod, planner) for share in shorter]
     return {
         "task": [name, planner, step, coarse],
         "maze": name,
@@ -207,12 +209,13 @@ def scan_family(name: str, planner: str, step: float, coarse: float) -> dict[str
         "longest": None if longest is None else float(longest * rod * (1.0 - 1e-9)),
         "share": None if longest is None else float(longest),
         "shorter": len(shorter),
-        "shorter_solved": len(passed),
+        "shorter_solved": outcomes.count("solved"),
+        "shorter_not_checked": outcomes.count("not checked"),
     }
 
 
-def _passes(name: str, link_length: float, planner: str) -> bool:
-    return bool(try_length(name, float(link_length), planner)["status"] == "solved")
+def _outcome(name: str, link_length: float, planner: str) -> str:
+    return str(try_length(name, float(link_length), planner, False)["status"])
 
 
 def rules_compared(
@@ -241,9 +244,12 @@ def rules_compared(
         Called after each try.
     """
     units = {name: PAPER_LINK_LENGTHS.get(name) or family_rod(name)[0] for name in names}
-    tasks = [("fig19", length, variant) for variant in variants for length in lengths]
+    tasks = [("fig19", length, variant, True) for variant in variants for length in lengths]
     tasks += [
-        (name, share * units[name], variant) for variant in variants for name in names for share in shares
+        (name, share * units[name], variant, False)
+        for variant in variants
+        for name in names
+        for share in shares
     ]
     rows = trials(tasks, workers, tell)
     return [_effect(variant, [row for row in rows if row["planner"] == variant]) for variant in variants]

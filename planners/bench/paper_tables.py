@@ -229,9 +229,10 @@ def _ends(row: Mapping[str, Any]) -> str:
 def _families(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     _, _, step, coarse = rows[0]["task"]
     yield (
-        f"**families**: the longest link that passes, in px and as a share of the longest rod, in steps of "
-        f"{step:g} of it; in brackets how many of the shorter ones pass, in steps of {coarse:g}, down to "
-        "0.15. Rods in closed form are those of the tightest turn alone; one with a star is a proven bound."
+        "**families**: the longest link that passes, in px and as a share of the longest rod, in steps of "
+        f"{step:g} of it; in brackets how many of the shorter ones that were checked pass, in steps of "
+        f"{coarse:g}, down to 0.15. Rods in closed form are those of the tightest turn alone; one with a "
+        "star is a proven bound."
     )
     yield ""
     planners = list(dict.fromkeys(row["planner"] for row in rows))
@@ -256,7 +257,8 @@ def _rod(row: Mapping[str, Any]) -> str:
 def _longest(row: Mapping[str, Any]) -> str:
     if row["longest"] is None:
         return "none"
-    return f"{row['longest']:.1f}, {row['share']:.2f} ({row['shorter_solved']} of {row['shorter']})"
+    checked = row["shorter"] - row["shorter_not_checked"]
+    return f"{row['longest']:.1f}, {row['share']:.2f} ({row['shorter_solved']} of {checked})"
 
 
 def _rules(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:

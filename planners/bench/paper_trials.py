@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,6 +34,9 @@ RULES = {"beam": CLAMPED, "as-printed": AS_PRINTED}
 
 JUMP_SAMPLES = 15
 """At so many places between two poses the depth is looked for where a joint jumps."""
+
+MOST_CHECKED = 2_400_000
+"""Links times poses of the longest motion that is checked where many are; the check takes up to a minute."""
 
 TIME_BUDGET = 10.0
 """Seconds that a planner may take for one length."""
@@ -97,7 +101,12 @@ def warm_up_trials() -> None:
 
 
 def try_planner(
-    maze: Maze, link_length: float, planner: str | Rules, geometry: Geometry | None = None
+    maze: Maze,
+    link_length: float,
+    planner: str | Rules,
+    geometry: Geometry | None = None,
+    *,
+    depths: bool = True,
 ) -> Trial:
     """Ask a planner for one length, and the exact checker about its motion.
 
@@ -111,6 +120,9 @@ def try_planner(
         A name that `plan` knows, or the rules that are followed.
     geometry : Geometry, optional
         Of the maze; otherwise it is computed.
+    depths : bool
+        Whether to measure how deep a motion gets that is not valid, which takes longer than to refuse it. If
+        not, motions of more than `MOST_CHECKED` links times poses are not checked, and so not solved.
     """
     rules = RULES.get(planner) if isinstance(planner, str) else planner
     try:
@@ -122,9 +134,9 @@ def try_planner(
     if geometry is not None:
         query.surveys[id(query.route)] = geometry
     if rules is not None:
-        return _by_rules(query, rules)
+        return _by_rules(query, rules, depths)
     if planner == "follow":
-        return _by_path(query)
+        return _by_path(query, depths)
     result = plan(maze, arm, str(planner), time_budget=TIME_BUDGET, explain=False)
     if result.motion is None or result.report is None:
         return Trial(status=str(result.status), why=result.reason)
@@ -139,22 +151,22 @@ def try_planner(
     )
 
 
-def _by_rules(query: Query, rules: Rules) -> Trial:
+def _by_rules(query: Query, rules: Rules, depths: bool) -> Trial:
     geometry = query.geometry
     if geometry is None:
         return Trial(status=str(PlanningStatus.NO_PATH), came=0.0)
     run = run_beam(geometry, query.arm, rules, record=False)
     motion = run.motion(query.maze)
     if run.ending == GOAL:
-        return judged(motion, query.maze)
+        return judged(motion, query.maze, depths)
     came = share_of_path(geometry, motion.joints[-1, -1])
     return Trial(status=str(PlanningStatus.DEAD_END), motion=motion, came=came, why=run.reason(query.maze))
 
 
-def _by_path(query: Query) -> Trial:
+def _by_path(query: Query, depths: bool) -> Trial:
     candidate = plan_path_following(query)
     if candidate.motion is not None:
-        return judged(candidate.motion, query.maze)
+        return judged(candidate.motion, query.maze, depths)
     came = 0.0
     if candidate.failure is not None and query.geometry is not None:
         came = share_of_path(query.geometry, np.asarray(candidate.failure.place))
@@ -167,14 +179,19 @@ def share_of_path(geometry: Geometry, place: FloatArray) -> float:
     return float(path.s[np.argmin(np.hypot(*(path.points - place).T))] / path.length)
 
 
-def judged(motion: Motion, maze: Maze) -> Trial:
+def judged(motion: Motion, maze: Maze, depths: bool = True) -> Trial:
     """Let the exact checker decide about a motion to the goal, and say how deep it gets.
 
     The full check may take minutes where many links are deep between poses. A motion that is refused at its
     poses already, for depth or steps, is refused here too; for every other motion the full check decides.
     """
-    depth, scene = depth_at_poses(motion, maze), Scene(motion=motion, maze=maze, radius=0.0)
-    _, step = check_steps(scene)
+    _, step = check_steps(Scene(motion=motion, maze=maze, radius=0.0))
+    if not depths and (step is not None or not is_free_at_poses(motion, maze)):
+        why = "a link is in a wall at a pose, or a joint moves too far between two"
+        return Trial(status=str(PlanningStatus.NOT_VALID), motion=motion, came=1.0, why=why)
+    if not depths and motion.n_poses * motion.n_links > MOST_CHECKED:
+        return Trial(status="not checked", motion=motion, came=1.0, why="its exact check takes minutes")
+    depth = depth_at_poses(motion, maze)
     if depth == 0.0 and step is None:
         report = validate(motion, maze)
         bound = report.penetration_between
@@ -195,6 +212,12 @@ def judged(motion: Motion, maze: Maze) -> Trial:
         came=1.0,
         why=why,
     )
+
+
+def is_free_at_poses(motion: Motion, maze: Maze) -> bool:
+    """Say whether no link is in a wall at any pose."""
+    scene = Scene(motion=motion, maze=maze, radius=0.0)
+    return all(shapely.covers(scene.free, shapely.linestrings(links)).all() for links in _links(scene))
 
 
 def depth_at_poses(motion: Motion, maze: Maze) -> float:
@@ -225,12 +248,8 @@ def _depth(motion: Motion, maze: Maze, least: float) -> float:
     """Find the largest depth over all poses, if it is larger than `least`; else return that."""
     scene, deepest = Scene(motion=motion, maze=maze, radius=0.0), least
     shallow = scene.free if least == 0.0 else prepared(maze.free_space.buffer(least))
-    for first in range(0, motion.n_poses, CHUNK):
-        arc = scene.arc[first : first + CHUNK]
-        joints = scene.in_maze(motion.joints[first : first + CHUNK], arc)
-        out = arc[:, 1:] > ROUNDING * scene.length
-        segments = np.stack([joints[:, :-1], joints[:, 1:]], axis=2)[out]
-        segments = segments[~shapely.covers(shallow, shapely.linestrings(segments))]
+    for links in _links(scene):
+        segments = links[~shapely.covers(shallow, shapely.linestrings(links))]
         if not len(segments):
             continue
         clearance, _, _ = nearest(scene, segments, np.zeros(len(segments), dtype=bool))
@@ -238,3 +257,11 @@ def _depth(motion: Motion, maze: Maze, least: float) -> float:
             deepest = -clearance
             shallow = prepared(maze.free_space.buffer(deepest))
     return deepest
+
+
+def _links(scene: Scene) -> Iterator[FloatArray]:
+    """Yield the links that are out of the feeder, shape (n, 2, 2), some poses at a time."""
+    for first in range(0, scene.motion.n_poses, CHUNK):
+        arc = scene.arc[first : first + CHUNK]
+        joints = scene.in_maze(scene.motion.joints[first : first + CHUNK], arc)
+        yield np.stack([joints[:, :-1], joints[:, 1:]], axis=2)[arc[:, 1:] > ROUNDING * scene.length]
