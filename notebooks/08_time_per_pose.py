@@ -64,8 +64,8 @@ for name, timed in runs.items():
     mark = "the goal" if timed.at_goal else "a dead end"
     place = (timed.feeds[-1], 1e3 * total[-1])
     axes.plot(*place, "o", color=colour, markersize=5)
-    below = {"textcoords": "offset points", "ha": "center", "fontsize": 8, "color": colour}
-    axes.annotate(mark, place, (0, -16), **below)
+    look = {"textcoords": "offset points", "ha": "right", "fontsize": 8, "color": colour}
+    axes.annotate(mark, place, (-9, 6), bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0}, **look)
     print(f"{name}: {len(total)} poses in {1e3 * total[-1]:.0f} ms, {timed.links_out[-1]} links, to {mark}")
 axes.set(xlabel="length of arm that is out (px)", ylabel="cumulative time (ms)", xlim=(0, None))
 axes.set_ylim(0, None)
