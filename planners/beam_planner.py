@@ -282,7 +282,7 @@ class FedArm:
         # A joint track that swings from wall to wall is longer than the path, but never by this much.
         n_links = math.ceil(1.6 * path.length / length) + 4
         n_max = 6 * POSES_PER_LINK * n_links
-        self.geometry, self.link_length = geometry, length
+        self.geometry, self.link_length, self._walls = geometry, length, geometry.maze.walls
         self.way, self.terms = way_of(geometry), terms_of(geometry, arm, rules)
         self.feeds, self.headings = np.empty(n_max), np.empty((n_max, n_links))
         self.record = np.empty((n_max if record else 0, n_links, 5), dtype=np.int64)
@@ -303,7 +303,7 @@ class FedArm:
             maze.goal,
             STOP * maze.goal_radius,
             self.terms,
-            maze.walls,
+            self._walls,
             POSES_PER_LINK,
             STEP * self.link_length,
             room if n_poses is None else min(room, self.n_poses + n_poses),
