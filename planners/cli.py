@@ -189,23 +189,37 @@ def simulate_command(
     link_radius: RadiusOption = 0.0,
     substeps: Annotated[int, typer.Option("--substeps", help="Simulated steps per action.")] = 4,
     out: Annotated[Path | None, typer.Option("--out", help="Write an animation (.gif).")] = None,
+    replay: Annotated[
+        Path | None, typer.Option("--replay", help="Write a page to play it in a browser (.html).")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Drive the simulated arm along a motion, and say whether its links merely pinched the walls."""
+    from hrsnake_env.replay import save_replay
     from planners.rollout import simulate_motion  # needs the simulator, which other commands do not
 
     _check_output(out)
+    _check_output(replay, (".html",))
     world, moved = Maze.load(maze), Motion.load(motion)
     arm = _arm(moved.link_length, moved.n_links, link_radius, None)
     with _progress(as_json) as progress:
         episode = simulate_motion(moved, world, arm, substeps=substeps, progress=progress)
         if out is not None:
             _animate(world, episode, out, progress)
+        if replay is not None:
+            save_replay([episode.trace(world, link_radius=link_radius)], replay)
     _print(
         as_json,
-        {"success": episode.success, "verdict": episode.report.to_dict(), "out": _name(out)},
+        {
+            "success": episode.success,
+            "verdict": episode.report.to_dict(),
+            "out": _name(out),
+            "replay": _name(replay),
+        },
         lambda: tables.show_verdict(world, episode, out),
     )
+    if replay is not None and not as_json:
+        print(f"Written: {replay}")
     if not (episode.success and episode.report.clean):
         raise typer.Exit(NOT_CLEAN)
 

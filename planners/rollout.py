@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -15,7 +16,8 @@ import hrsnake_env  # registers the environment
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.contacts import Contact, PinchReport
 from hrsnake_env.maze import Maze
-from hrsnake_env.physics import simulate
+from hrsnake_env.physics import CONTROL_TIMESTEP, simulate
+from hrsnake_env.replay import Trace
 from planners.controllers import PlannedPolicy
 from planners.problem import Motion, Progress
 
@@ -49,6 +51,8 @@ class Episode:
         As the environment gave them.
     contacts : tuple, one entry per pose
         The contacts of each pose.
+    clearances : array, shape (n_steps + 1, n_links)
+        Of each link at each pose, in maze units; negative is the depth.
     success : bool
         Whether the tip came to the goal.
     report : PinchReport
@@ -60,6 +64,7 @@ class Episode:
     joints: FloatArray
     rewards: FloatArray
     contacts: tuple[tuple[Contact, ...], ...]
+    clearances: FloatArray
     success: bool
     report: PinchReport
     seconds: float
@@ -77,8 +82,47 @@ class Episode:
         """Return the links that collide with something in a pose."""
         return self._touching(pose, "collision")
 
+    def trace(self, maze: Maze, *, title: str | None = None, link_radius: float = 0.0) -> Trace:
+        """Return the episode as a replay shows it (`hrsnake_env.replay`).
+
+        Parameters
+        ----------
+        maze : Maze
+            In which it ran.
+        title : str, optional
+            By default the maze and the links.
+        link_radius : float
+            In maze units.
+        """
+        length, n_links = self.report.link_length, self.report.n_links
+        links = f"{n_links} links of {length:g} {maze.units}"
+        return Trace(
+            title=f"{maze.name}, {links}" if title is None else title,
+            maze=maze,
+            joints=self.joints,
+            link_length=length,
+            link_radius=link_radius,
+            timestep=CONTROL_TIMESTEP,
+            clearances=self.clearances,
+            contacts=self.contacts,
+            clean=self.report.clean,
+            summary=tuple(_summary(self, maze.units)),
+        )
+
     def _touching(self, pose: int, kind: str) -> frozenset[int]:
         return frozenset(contact.link for contact in self.contacts[pose] if contact.kind == kind)
+
+
+def _summary(episode: Episode, units: str) -> Iterator[str]:
+    report, exact = episode.report, episode.report.kinematic
+    yield "goal reached" if episode.success else "goal not reached"
+    yield f"link-poses: {report.free} free, {report.pinch} pinch, {report.collision} collision"
+    depth = f"deepest {report.worst_depth:.3g} {units}"
+    yield (
+        depth if exact is None else f"{depth}; {exact.worst_depth:.3g} {units} with links that no wall pushes"
+    )
+    if report.largest_impulse > 0.0:
+        yield f"largest wall impulse {report.largest_impulse:.3g} link masses x link lengths / s"
 
 
 def run_episode(
@@ -106,6 +150,7 @@ def run_episode(
     observation, info = env.reset(seed=seed)
     limit = None if env.spec is None else env.spec.max_episode_steps
     joints, contacts, rewards = [world.physics.joints.copy()], [world.physics.pose_contacts], []
+    clearances = [world.physics.clearance]
     state, start, over = None, np.array([True]), False
     began = time.perf_counter()
     while not over:
@@ -113,6 +158,7 @@ def run_episode(
         observation, reward, terminated, truncated, info = env.step(action)
         joints.append(world.physics.joints.copy())
         contacts.append(world.physics.pose_contacts)
+        clearances.append(world.physics.clearance)
         rewards.append(float(reward))
         start, over = np.array([False]), terminated or truncated
         if progress is not None and limit and len(rewards) % 50 == 0:
@@ -121,6 +167,7 @@ def run_episode(
         joints=np.array(joints),
         rewards=np.array(rewards),
         contacts=tuple(contacts),
+        clearances=np.array(clearances),
         success=bool(info["is_success"]),
         report=world.physics.report(),
         seconds=time.perf_counter() - began,

@@ -175,6 +175,15 @@ def test_ctrl_c_gives_the_longest_link_so_far(run, monkeypatch):
     assert Motion.load("m.npz").link_length > 0.0
 
 
+def test_simulate_writes_a_replay(run, motion):
+    motion.save("m.npz")
+    code, out, _ = run("simulate", "fig19", "m.npz", "--replay", "r.html")
+    assert code == 0 and "Written: r.html" in out
+    assert Path("r.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    code, out, _ = run("simulate", "fig19", "m.npz", "--replay", "r.html", "--json")
+    assert json.loads(out)["replay"] == "r.html" and len(out.splitlines()) == 1
+
+
 def test_draw_writes_a_picture(run, motion):
     motion.save("m.npz")
     code, out, _ = run("draw", "fig19", "m.npz", "--out", "p.svg")
@@ -298,6 +307,7 @@ BAD_INPUT = [
     ("simulate fig19 foreign.npz", "Expected a motion from the base of maze 'fig19'"),
     ("simulate fig19 m.npz --substeps 0", "Expected substeps to be a whole number of at least 1, got 0."),
     ("simulate fig19 m.npz --out no/a.gif", "Expected an existing folder for 'no/a.gif'"),
+    ("simulate fig19 m.npz --replay r.gif", "Expected a file name ending in .html, got 'r.gif'."),
     ("draw fig19 foreign.npz", "Expected a motion from the base of maze 'fig19'"),
     ("draw fig19 --out p.jpeg2", "Expected a file name ending in .png, .svg, .pdf, got 'p.jpeg2'."),
     ("draw fig19 --link-radius 150", "Expected a maze with a path for links of radius 150"),

@@ -144,6 +144,27 @@ def test_more_substeps_track_better(benchmark, episode, substeps):
     assert (other.report.node_error < episode.report.node_error) == (substeps > 4)
 
 
+def test_clearances_are_those_of_the_deepest_contacts(episode):
+    assert episode.clearances.shape == (episode.n_steps + 1, 7)
+    for clearances, touching in zip(episode.clearances, episode.contacts, strict=True):
+        for contact in touching:
+            assert clearances[contact.link] <= contact.clearance + 1e-9
+
+
+def test_a_trace_holds_the_episode(episode):
+    maze = fig19()
+    trace = episode.trace(maze, title="t")
+    assert (trace.title, trace.n_poses, trace.n_links, trace.link_length) == (
+        "t",
+        len(episode.joints),
+        7,
+        430.0,
+    )
+    assert trace.clean and trace.summary[0] == "goal reached" and trace.timestep == 0.05
+    np.testing.assert_array_equal(trace.joints, episode.joints)
+    assert episode.trace(maze).title == "fig19, 7 links of 430 px"
+
+
 def test_links_at_the_limit_have_a_clean_verdict_too():
     motion = plan(fig19(), ArmSpec(link_length=439.2), planner="sweep").motion
     episode = simulate_motion(motion, fig19())
@@ -171,7 +192,7 @@ def test_the_policy_reaches_the_goal_through_gym_make(benchmark):
     env = gym.make("HyperRedundantMaze-v0", maze="fig19", link_length=430.0, n_links=7)
     episode = run_episode(env, PlannedPolicy(benchmark), seed=0)
     assert episode.success
-    assert len(episode.contacts) == len(episode.joints) == episode.n_steps + 1
+    assert len(episode.contacts) == len(episode.joints) == len(episode.clearances) == episode.n_steps + 1
     env.close()
 
 
