@@ -194,9 +194,12 @@ def scan_family(name: str, planner: str, step: float, coarse: float) -> dict[str
     rod, closed = family_rod(name)
     shares = np.round(np.arange(1.0, SHORTEST - 1e-9, -step), 9)
     # Just below the rod's length: at the length itself it is pinched everywhere.
-    longest = next(
-        (share for share in shares if _outcome(name, share * rod * (1.0 - 1e-9), planner) == "solved"), None
-    )
+    longest, longer = None, []
+    for share in shares:
+        longer.append(_outcome(name, share * rod * (1.0 - 1e-9), planner))
+        if longer[-1] == "solved":
+            longest = share
+            break
     grid = np.round(np.arange(1.0, SHORTEST - 1e-9, -coarse), 9)
     shorter = [float(share) for share in grid if longest is not None and share < longest]
     outcomes = [_outcome(name, share * rod, planner) for share in shorter]
@@ -208,6 +211,7 @@ def scan_family(name: str, planner: str, step: float, coarse: float) -> dict[str
         "closed_form": closed,
         "longest": None if longest is None else float(longest * rod * (1.0 - 1e-9)),
         "share": None if longest is None else float(longest),
+        "longer_not_checked": longer.count("not checked"),
         "shorter": len(shorter),
         "shorter_solved": outcomes.count("solved"),
         "shorter_not_checked": outcomes.count("not checked"),

@@ -255,10 +255,12 @@ def _rod(row: Mapping[str, Any]) -> str:
 
 
 def _longest(row: Mapping[str, Any]) -> str:
+    skipped = row["longer_not_checked"]
+    unsure = f"; {skipped} longer not checked" if skipped else ""
     if row["longest"] is None:
-        return "none"
+        return f"none{unsure}"
     checked = row["shorter"] - row["shorter_not_checked"]
-    return f"{row['longest']:.1f}, {row['share']:.2f} ({row['shorter_solved']} of {checked})"
+    return f"{row['longest']:.1f}, {row['share']:.2f} ({row['shorter_solved']} of {checked}{unsure})"
 
 
 def _rules(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
