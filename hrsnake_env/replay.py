@@ -104,6 +104,8 @@ class Trace:
             self._keep("clearances", clearances)
         if self.contacts is not None:
             self._check_contacts(self.contacts, reach)
+            object.__setattr__(self, "contacts", tuple(map(tuple, self.contacts)))
+        object.__setattr__(self, "summary", tuple(self.summary))
 
     def _keep(self, name: str, values: FloatArray) -> None:
         values.setflags(write=False)
