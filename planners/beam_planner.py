@@ -29,7 +29,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrsnake_env.arm import ArmSpec
+from hrsnake_env.arm import FEEDER_RELEASE, ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners.beams import Beams
@@ -380,6 +380,7 @@ def terms_of(geometry: Geometry, arm: ArmSpec, rules: Rules) -> Terms:
     return Terms(
         length=length,
         joint_limit=math.inf if arm.joint_limit is None else float(arm.joint_limit),
+        release=FEEDER_RELEASE,
         near_end=NEAR_END * path.width,
         reach=max(5, round(REACH * length / path.s[1])),
         semi_critical=rules.semi_critical,

@@ -49,6 +49,7 @@ from planners.checks.arm_alone import (
     check_goal,
     check_joint_limit,
     check_lengths,
+    check_release,
     check_start,
     check_steps,
 )
@@ -67,6 +68,7 @@ FAULTS: Mapping[str, str] = MappingProxyType(
         "inconsistent": "the joint positions are not those of feed and joint angles",
         "feeder": "the feed is beyond the arm, or a link leaves the feeder's axis before its base-side joint "
         "has passed the base",
+        "release": "a joint just past the base bends faster than the feeder lets go of it",
         "start": "the first pose is not the whole arm in the feeder with the tip at the base",
         "goal": "the last pose does not have the tip inside the goal radius",
         "step": "a joint moves too far between two poses",
@@ -122,6 +124,7 @@ def validate(
         length,
         check_consistency(scene, sifted.astray),
         check_feeder(scene),
+        check_release(scene),
         check_start(scene),
         goal,
         step,

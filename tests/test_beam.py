@@ -16,6 +16,7 @@ from planners.kernels.beam_arm import FULL, GOAL
 from planners.kernels.beam_rules import turn_between
 from planners.kernels.beam_types import AXIS, CHOICE, CLOSEST, EDGE, PATH, PIECES, TANGENT, TARGET
 from planners.query import Query
+from planners.rollout import simulate_motion
 
 BOTH = pytest.mark.parametrize("rules", [AS_PRINTED, CLAMPED], ids=["as printed", "clamped"])
 
@@ -42,6 +43,13 @@ def test_the_paper_s_rules_as_printed_pass_the_benchmark(length):
 @pytest.mark.parametrize("length", [437.0, 438.0, 439.0, 439.5])
 def test_clamped_rules_pass_the_benchmark_up_to_the_longest_rod(length):
     assert plan(fig19(), ArmSpec(link_length=length), planner="beam").solved
+
+
+@pytest.mark.parametrize("length", [150.0, 430.0])
+def test_as_printed_the_simulated_links_merely_pinch_the_walls(length):
+    motion = plan(fig19(), ArmSpec(link_length=length), planner="as-printed").motion
+    episode = simulate_motion(motion, fig19())
+    assert episode.success and episode.report.clean
 
 
 @pytest.mark.parametrize("name", ["fig19", "fig17b", "fig17c"])
@@ -118,7 +126,8 @@ def test_every_link_points_where_the_record_says():
             if row[CHOICE] == AXIS:
                 assert heading == pytest.approx(math.pi / 2)
                 continue
-            if row[PIECES] > 0:
+            past_base = joints[k + 1, 1] - fig19().base_pose[1]
+            if row[PIECES] > 0 or past_base < 0.2 * 430.0:  # softened, or not yet let go by the feeder
                 continue
             start, choice = joints[k + 1], int(row[CHOICE])
             seen.add(choice)

@@ -73,6 +73,7 @@ def terms(**changes):
     usual = {
         "length": 1.0,
         "joint_limit": math.inf,
+        "release": 16.0,
         "near_end": 0.1,
         "reach": 50,
         "semi_critical": True,

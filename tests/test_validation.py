@@ -237,6 +237,20 @@ def test_a_link_is_held_until_a_pose_at_which_its_base_side_joint_has_passed():
         assert ("feeder" in kinds(report)) is held, pose
 
 
+@pytest.mark.parametrize(("excess", "faulty"), [(-1e-3, False), (1e-3, True)])
+def test_a_joint_that_bends_faster_than_the_feeder_lets_go_of_it_is_a_fault(excess, faulty):
+    # 1 px past the base, the feeder lets a joint of links of 100 px bend by 16 * 0.01 rad.
+    maze = corridor(length=2000.0)
+    motion = straight_in(maze, 100.0, 8, 201.0)
+    angles = motion.joint_angles.copy()
+    angles[-1, 6] = 0.16 + excess
+    found = validate(Motion.from_configurations(motion.feed, angles, 100.0, motion.base_pose), maze)
+    assert ("release" in kinds(found)) is faulty
+    if faulty:
+        assert fault(found, "release").link == 6
+        assert fault(found, "release").amount == pytest.approx(excess)
+
+
 def test_a_rear_joint_that_leaves_the_axis_is_a_fault():
     report = planted(lambda joints: joints + np.array([0.01, 0.0]), 759)
     found = fault(report, "feeder")

@@ -6,12 +6,15 @@ import math
 
 import numpy as np
 
-from hrsnake_env.arm import FloatArray, joints_from_configuration
+from hrsnake_env.arm import FloatArray, feeder_angle_limits, joints_from_configuration
 from planners.checks.scene import PLACE_SLACK, ROUNDING, Scene, joint_fault, worst_of
 from planners.problem import Fault
 
 STEP_LIMIT = 0.05
 """Largest movement of a joint between two poses, in link lengths."""
+
+ANGLE_SLACK = 1e-6
+"""Of the angles that the feeder leaves, in rad."""
 
 
 def check_lengths(scene: Scene) -> tuple[float, Fault | None]:
@@ -68,6 +71,24 @@ def check_feeder(scene: Scene) -> Fault | None:
         return None
     message = f"Link {link}, still held by the feeder, is {scene.figure(amount)} off its axis at pose {pose}."
     return joint_fault(scene, "feeder", message, pose, link, amount)
+
+
+def check_release(scene: Scene) -> Fault | None:
+    """Check that joints bend no faster than the feeder lets go of them.
+
+    Between poses too: angles are linear in the feed there, and the limit of a joint past the base is concave.
+    """
+    motion = scene.motion
+    limits = feeder_angle_limits(motion.feed, motion.n_links, motion.link_length)
+    amount, pose, joint = worst_of(np.abs(motion.joint_angles) - limits)
+    if amount <= ANGLE_SLACK:
+        return None
+    angle = abs(motion.joint_angles[pose, joint])
+    message = (
+        f"Joint {joint}, just past the base, is bent by {angle:.4g} rad at pose {pose}, where the feeder lets "
+        f"it bend by {limits[pose, joint]:.4g}."
+    )
+    return joint_fault(scene, "release", message, pose, joint, amount)
 
 
 def check_start(scene: Scene) -> Fault | None:

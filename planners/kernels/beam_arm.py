@@ -114,6 +114,7 @@ def place_downstream_link(
     links: Records,
     k: int,
     share: float,
+    released: float,
     terms: Terms,
     walls: FloatArray,
     blocked: FloatArray,
@@ -121,7 +122,8 @@ def place_downstream_link(
 ) -> bool:
     """Place a link downstream of the reference link (Part B), whose adjacent link is placed.
 
-    Returns False if it has no free direction within its joint's limit.
+    The feeder has let go of its joint by `released` rad. Returns False if it has no free direction within
+    this and its joint's limit.
     """
     link, adjacent = links[k], links[k + 1]
     was, was_about, direction = link.choice, link.corner, link.heading
@@ -131,14 +133,14 @@ def place_downstream_link(
     if link.choice != was or link.corner != was_about:
         link.pieces = terms.degree
     wanted, link.pieces = soften(direction, wanted, link.pieces, share)
-    straight = adjacent.heading
-    wanted = straight + min(max(turn_between(straight, wanted), -terms.joint_limit), terms.joint_limit)
+    straight, most_bent = adjacent.heading, min(released, terms.joint_limit)
+    wanted = straight + min(max(turn_between(straight, wanted), -most_bent), most_bent)
     if terms.clamp:
         found, wanted = clamp_to_free(
             wanted, direction, terms.turn * share, adjacent.x, adjacent.y, terms.length, walls, terms.pad,
             blocked, gaps,
         )  # fmt: skip
-        if not found or abs(wanted - straight) > terms.joint_limit + 1e-12:
+        if not found or abs(wanted - straight) > most_bent + 1e-12:
             return False
     link.heading = direction + turn_between(direction, wanted)
     link.x = adjacent.x + terms.length * np.cos(wanted)
@@ -184,10 +186,12 @@ def place_arm(
 
     Returns -1, or the link that has no free direction.
     """
-    place_reference_link(links, reference, feed - reference * terms.length, base_pose)
+    axial = feed - reference * terms.length
+    place_reference_link(links, reference, axial, base_pose)
     place_upstream_links(links, reference, terms.length, base_pose)
     for k in range(reference - 1, -1, -1):
-        if not place_downstream_link(way, links, k, share, terms, walls, blocked, gaps):
+        released = terms.release * (axial / terms.length + reference - 1 - k)
+        if not place_downstream_link(way, links, k, share, released, terms, walls, blocked, gaps):
             return k
     return -1
 

@@ -83,6 +83,8 @@ class Terms(NamedTuple):
     ----------
     length, joint_limit : float
         Of the links.
+    release : float
+        How fast the feeder lets go of a joint, in rad per link length that the joint is past the base.
     near_end : float
         A beam that crosses a link this near to its end is the one through its end (3.2).
     reach : int
@@ -105,6 +107,7 @@ class Terms(NamedTuple):
 
     length: float
     joint_limit: float
+    release: float
     near_end: float
     reach: int
     semi_critical: bool
