@@ -85,8 +85,8 @@ def check_release(scene: Scene) -> Fault | None:
         return None
     angle = abs(motion.joint_angles[pose, joint])
     message = (
-        f"Joint {joint}, just past the base, is bent by {angle:.4g} rad at pose {pose}, where the feeder lets "
-        f"it bend by {limits[pose, joint]:.4g}."
+        f"Joint {joint}, just past the base, is bent by {angle:.4g} rad at pose {pose}, where the feeder "
+        f"lets it bend by {limits[pose, joint]:.4g}."
     )
     return joint_fault(scene, "release", message, pose, joint, amount)
 
