@@ -54,7 +54,7 @@ STEPS: dict[str, dict[str, Any]] = {
     "without the tangent rule": {"tangent_blocks": False},
     "without both": {"jump_blocks": False, "tangent_blocks": False},
     "without semi-critical": {"semi_critical": False},
-    "softening degree 1 (none)": {"softening_degree": 1},
+    "softening degree 1": {"softening_degree": 1},
     "softening degree 8": {"softening_degree": 8},
     "softening degree 20": {"softening_degree": 20},
 }
