@@ -274,15 +274,11 @@ def bench_speed_command(
 ) -> None:
     """Measure speed and scale: stages, growth, memory, first call, random mazes, and OMPL beside."""
     from planners.bench import speed
-    from planners.bench.records import write_results
     from planners.bench.speed_tables import speed_markdown
 
-    _check_output(out, (".json",))
-    chosen = tuple(part.strip() for part in parts.split(",")) if parts else speed.PARTS
-    results = speed.run_speed(speed.QUICK if quick else speed.FULL, parts=chosen, quiet=as_json)
-    if out is not None:
-        write_results(results, out)
-    _print(as_json, results, lambda: print(speed_markdown(results)))
+    sizes = speed.QUICK if quick else speed.FULL
+    chosen = _parts(parts, speed.PARTS, out)
+    _publish(speed.run_speed(sizes, parts=chosen, quiet=as_json), speed_markdown, out, as_json)
 
 
 @bench_app.command("paper")
@@ -295,14 +291,10 @@ def bench_paper_command(
     """Measure the paper's results: workspaces, time per pose, growth, index, families, and its rules."""
     from planners.bench import paper
     from planners.bench.paper_tables import paper_markdown
-    from planners.bench.records import write_results
 
-    _check_output(out, (".json",))
-    chosen = tuple(part.strip() for part in parts.split(",")) if parts else paper.PARTS
-    results = paper.run_paper(paper.QUICK if quick else paper.FULL, parts=chosen, quiet=as_json)
-    if out is not None:
-        write_results(results, out)
-    _print(as_json, results, lambda: print(paper_markdown(results)))
+    sizes = paper.QUICK if quick else paper.FULL
+    chosen = _parts(parts, paper.PARTS, out)
+    _publish(paper.run_paper(sizes, parts=chosen, quiet=as_json), paper_markdown, out, as_json)
 
 
 def main() -> None:
@@ -340,6 +332,23 @@ def _lengths(text: str) -> list[float]:
         raise InputError(
             f"Expected lengths as numbers with commas between them (100,200,300), got '{text}'."
         ) from None
+
+
+def _parts(text: str, every: tuple[str, ...], out: Path | None) -> tuple[str, ...]:
+    """Read which parts of a benchmark are wanted; refuse a file that could not be written first."""
+    _check_output(out, (".json",))
+    return tuple(part.strip() for part in text.split(",")) if text else every
+
+
+def _publish(
+    results: dict[str, Any], markdown: Callable[[dict[str, Any]], str], out: Path | None, as_json: bool
+) -> None:
+    """Write the results of a benchmark, and print them."""
+    from planners.bench.records import write_results
+
+    if out is not None:
+        write_results(results, out)
+    _print(as_json, results, lambda: print(markdown(results)))
 
 
 def _write_longest(
