@@ -158,8 +158,8 @@ AS_PRINTED = Rules(clamp=False)
 """The rules of the paper, and no more."""
 
 CLAMPED = Rules(jump_blocks=False)
-"""The rules of the paper and the clamp, without the one that hurts then: a link that is held by a wall often
-never finds the tangent point until which it is to block the next one."""
+"""The rules of the paper and the clamp, without the one that then costs a little, presumably as a link
+that is held by a wall may never find the tangent point until which it is to block the next one."""
 
 
 def plan_beam(query: Query, rules: Rules = CLAMPED) -> Candidate:

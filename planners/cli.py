@@ -216,10 +216,8 @@ def simulate_command(
             "out": _name(out),
             "replay": _name(replay),
         },
-        lambda: tables.show_verdict(world, episode, out),
+        lambda: tables.show_verdict(world, episode, (out, replay)),
     )
-    if replay is not None and not as_json:
-        print(f"Written: {replay}")
     if not (episode.success and episode.report.clean):
         raise typer.Exit(NOT_CLEAN)
 

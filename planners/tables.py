@@ -190,8 +190,8 @@ def _place(place: Sequence[float]) -> str:
     return f"({place[0]:.5g}, {place[1]:.5g})"
 
 
-def show_verdict(maze: Maze, episode: Episode, out: Path | None) -> None:
-    """Print what the simulation found."""
+def show_verdict(maze: Maze, episode: Episode, files: Iterable[Path | None]) -> None:
+    """Print what the simulation found, and which files were written."""
     goal = "reached" if episode.success else "NOT REACHED"
     rows = [
         ("maze", maze.name),
@@ -199,8 +199,9 @@ def show_verdict(maze: Maze, episode: Episode, out: Path | None) -> None:
         ("steps", f"{episode.n_steps}, {seconds(episode.seconds / episode.n_steps)} each"),
     ]
     show_rows("Simulation", [*rows, *verdict_rows(maze, episode.report)])
-    if out is not None:
-        print(f"Written: {out}")
+    for out in files:
+        if out is not None:
+            print(f"Written: {out}")
 
 
 def show_geometry(maze: Maze, summary: dict[str, Any], out: Path) -> None:

@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
-__all__ = ["measured_on", "milliseconds", "table"]
+__all__ = ["milliseconds", "parts_in_markdown", "table"]
+
+
+def parts_in_markdown(
+    results: Mapping[str, Any], writers: Mapping[str, Callable[[Any], Iterator[str]]]
+) -> str:
+    """Write all parts that were measured, in the order of the writers, below a line about the machine."""
+    lines = [measured_on(results)]
+    for part, write in writers.items():
+        if part in results:
+            lines += ["", *write(results[part])]
+    return "\n".join(lines)
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:

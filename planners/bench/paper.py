@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,7 +25,7 @@ from planners.bench.paper_speed import (
 )
 from planners.bench.paper_trials import RULES, warm_up_trials
 from planners.bench.pool import Tell, bar
-from planners.bench.records import check_parts, load, machine
+from planners.bench.records import run_parts
 
 __all__ = ["FULL", "PARTS", "QUICK", "PaperSizes", "run_paper"]
 
@@ -157,18 +155,12 @@ def run_paper(
     InputError
         If there is no such part.
     """
-    check_parts(parts, PARTS)
-    count = os.cpu_count() or 1 if workers is None else workers
-    start = time.perf_counter()
-    results: dict[str, Any] = {"machine": machine(), "workers": count}
-    warm_up_trials()
-    for part in PARTS:
-        if part in parts:
-            with bar(part, _total(part, sizes), quiet) as tell:
-                results[part] = _measure(part, sizes, count, tell)
-    results["seconds"] = time.perf_counter() - start
-    results["load_at_end"] = load()
-    return results
+
+    def measure(part: str, count: int) -> Any:
+        with bar(part, _total(part, sizes), quiet) as tell:
+            return _measure(part, sizes, count, tell)
+
+    return run_parts(parts, PARTS, workers, measure, warm_up_trials)
 
 
 def _total(part: str, sizes: PaperSizes) -> int:

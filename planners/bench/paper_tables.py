@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from planners.bench.markdown import measured_on, milliseconds, table
+from planners.bench.markdown import milliseconds, parts_in_markdown, table
 
 __all__ = ["paper_markdown"]
 
 
 def paper_markdown(results: Mapping[str, Any]) -> str:
     """Write all parts that were measured, each with a heading sentence and a table."""
-    writers: dict[str, Callable[[Any], Iterator[str]]] = {
-        "workspaces": _workspaces,
-        "poses": _poses,
-        "links": _links,
-        "index": _index,
-        "families": _families,
-        "rules": _rules,
-    }
-    lines = [measured_on(results)]
-    for part, write in writers.items():
-        if part in results:
-            lines += ["", *write(results[part])]
-    return "\n".join(lines)
+    return parts_in_markdown(
+        results,
+        {
+            "workspaces": _workspaces,
+            "poses": _poses,
+            "links": _links,
+            "index": _index,
+            "families": _families,
+            "rules": _rules,
+        },
+    )
 
 
 def _workspaces(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:

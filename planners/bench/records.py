@@ -1,18 +1,19 @@
-"""What every benchmark says besides its figures: machine, load, known parts; and the file of its results."""
+"""What every benchmark does besides measuring: run its parts, name machine and load, write the results."""
 
 from __future__ import annotations
 
 import json
 import os
 import platform
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
 
-__all__ = ["check_parts", "load", "machine", "write_results"]
+__all__ = ["check_parts", "machine", "run_parts", "write_results"]
 
 
 def check_parts(parts: Sequence[str], known: Sequence[str]) -> None:
@@ -25,6 +26,49 @@ def check_parts(parts: Sequence[str], known: Sequence[str]) -> None:
     """
     if unknown := [part for part in parts if part not in known]:
         raise InputError(f"Unknown part {unknown[0]!r}. Available: {', '.join(known)}.")
+
+
+def run_parts(
+    parts: Sequence[str],
+    known: Sequence[str],
+    workers: int | None,
+    measure: Callable[[str, int], Any],
+    warm_up: Callable[[], None] = lambda: None,
+) -> dict[str, Any]:
+    """Measure the wanted ones of all known parts, in the order of these.
+
+    Parameters
+    ----------
+    parts, known : sequence of str
+        What is wanted, and what there is.
+    workers : int or None
+        Processes at a time; None is one for each processor.
+    measure : callable
+        Given a part and the number of workers, returns its figures.
+    warm_up : callable
+        Called before the first part.
+
+    Returns
+    -------
+    results : dict
+        Plain data by part, with machine, workers, seconds and load.
+
+    Raises
+    ------
+    InputError
+        If there is no such part.
+    """
+    check_parts(parts, known)
+    count = os.cpu_count() or 1 if workers is None else workers
+    start = time.perf_counter()
+    results: dict[str, Any] = {"machine": machine(), "workers": count}
+    warm_up()
+    for part in known:
+        if part in parts:
+            results[part] = measure(part, count)
+    results["seconds"] = time.perf_counter() - start
+    results["load_at_end"] = load()
+    return results
 
 
 def machine() -> dict[str, Any]:

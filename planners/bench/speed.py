@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +9,7 @@ from planners.baselines.ompl_sampling import is_installed
 from planners.bench.beside import beside_ompl, ompl_tasks
 from planners.bench.many import ROUNDS, random_mazes
 from planners.bench.pool import bar
-from planners.bench.records import check_parts, load, machine
+from planners.bench.records import run_parts
 from planners.bench.single import PLANNERS, first_calls, growth_with_links, growth_with_way, memory, stages
 
 __all__ = ["FULL", "PARTS", "QUICK", "Sizes", "run_speed"]
@@ -118,16 +116,7 @@ def run_speed(
     InputError
         If there is no such part.
     """
-    check_parts(parts, PARTS)
-    count = os.cpu_count() or 1 if workers is None else workers
-    start = time.perf_counter()
-    results: dict[str, Any] = {"machine": machine(), "workers": count}
-    for part in PARTS:
-        if part in parts:
-            results[part] = _measure(part, sizes, count, quiet)
-    results["seconds"] = time.perf_counter() - start
-    results["load_at_end"] = load()
-    return results
+    return run_parts(parts, PARTS, workers, lambda part, count: _measure(part, sizes, count, quiet))
 
 
 def _measure(part: str, sizes: Sizes, workers: int, quiet: bool) -> Any:

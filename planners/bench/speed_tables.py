@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from planners.bench.markdown import measured_on, milliseconds, table
+from planners.bench.markdown import milliseconds, parts_in_markdown, table
 
 __all__ = ["speed_markdown"]
 
@@ -14,20 +14,18 @@ STAGES = ("potential", "path", "beams", "plan", "poses", "maze to poses", "valid
 
 def speed_markdown(results: Mapping[str, Any]) -> str:
     """Write all parts that were measured, each with a heading sentence and a table."""
-    writers: dict[str, Callable[[Any], Iterator[str]]] = {
-        "stages": _stages,
-        "links": _links,
-        "way": _way,
-        "memory": _memory,
-        "first call": _first_call,
-        "random mazes": _random_mazes,
-        "ompl": _ompl,
-    }
-    lines = [measured_on(results)]
-    for part, write in writers.items():
-        if part in results:
-            lines += ["", *write(results[part])]
-    return "\n".join(lines)
+    return parts_in_markdown(
+        results,
+        {
+            "stages": _stages,
+            "links": _links,
+            "way": _way,
+            "memory": _memory,
+            "first call": _first_call,
+            "random mazes": _random_mazes,
+            "ompl": _ompl,
+        },
+    )
 
 
 def _stages(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
