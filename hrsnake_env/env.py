@@ -2,28 +2,96 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
+from collections import OrderedDict
+from dataclasses import dataclass, field
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hrsnake_env import task
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.contacts import Contact, PinchReport
-from hrsnake_env.dynamics import largest_move, step_targets
 from hrsnake_env.errors import InputError
 from hrsnake_env.geodesic import GeodesicDistance
 from hrsnake_env.maze import Maze
-from hrsnake_env.physics import CONTROL_TIMESTEP, Physics
+from hrsnake_env.observation import AHEAD, observation_space, write_observation
+from hrsnake_env.options import ResetOptions
+from hrsnake_env.physics import CONTROL_TIMESTEP, Physics, PhysicsState
+from hrsnake_env.random_mazes import N_TASKS, RANDOM_LINK_LENGTH, RANDOM_N_LINKS, SPLITS, task_maze
 from hrsnake_env.rendering import MazePicture
 
-__all__ = ["HyperRedundantMazeEnv"]
+__all__ = ["EnvState", "HyperRedundantMazeEnv"]
 
-RESET_OPTIONS = ("feed", "joint_angles")
+N_SCENES = 8
+"""So many mazes are kept ready, with their walls and distances."""
+
+NO_TASK = -1
+
+
+@dataclass(slots=True)
+class _Tally:
+    """Count what has happened in the last step, and since the reset."""
+
+    distance: float
+    at_goal: int = 0
+    succeeded: bool = False
+    collided: bool = False
+    pinches: int = 0
+    collisions: int = 0
+    depth: float = 0.0
+    impulse: float = 0.0
+    terms: dict[str, float] = field(
+        default_factory=lambda: {"reward_progress": 0.0, "reward_contact": 0.0, "reward_goal": 0.0}
+    )
+    steps: int = 0
+    total_reward: float = 0.0
+    total_pinches: int = 0
+    total_collisions: int = 0
+    worst_depth: float = 0.0
+    worst_impulse: float = 0.0
+
+    def see(self, contacts: tuple[Contact, ...]) -> None:
+        """Take over the contacts of a step."""
+        self.pinches = self.collisions = 0
+        self.depth = self.impulse = 0.0
+        if contacts:
+            self.pinches = len({contact.link for contact in contacts if contact.kind == "pinch"})
+            self.collisions = len({contact.link for contact in contacts if contact.kind == "collision"})
+            self.depth = max(0.0, *(-contact.clearance for contact in contacts), 0.0)
+            self.impulse = max(contact.impulse for contact in contacts)
+        self.collided = self.collisions > 0
+        self.total_pinches += self.pinches
+        self.total_collisions += self.collisions
+        self.worst_depth = max(self.worst_depth, self.depth)
+        self.worst_impulse = max(self.worst_impulse, self.impulse)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class EnvState:
+    """Hold where an episode stands, from `HyperRedundantMazeEnv.get_state`; it can be pickled."""
+
+    maze: Maze
+    task_id: int
+    target: FloatArray
+    physics: PhysicsState
+    tally: Any
+    rng: dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Scene:
+    """Hold a maze with what is computed for it once."""
+
+    maze: Maze
+    distance: GeodesicDistance
+    way: float
+    physics: Physics
 
 
 class HyperRedundantMazeEnv(gym.Env[Any, Any]):
@@ -126,71 +194,142 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         link_length: float | None = None,
         n_links: int | None = None,
         link_radius: float = 0.0,
+        joint_limit: float | None = None,
+        observation: str = "state",
+        rays: bool = False,
+        image_size: int = 96,
+        action: str = "delta",
+        reward_type: str = "dense",
+        contact_penalty: float = task.CONTACT_PENALTY,
+        goal_radius: float | None = None,
+        success_hold_steps: int = 1,
+        terminate_on_collision: bool = True,
+        split: str = "train",
+        difficulty: tuple[float, float] = (0.0, 1.0),
         substeps: int = 4,
         torque_limit: float | None = None,
         actuation: str = "computed_torque",
-        terminate_on_collision: bool = True,
         render_mode: str | None = None,
     ) -> None:
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise InputError(f"Unknown render_mode {render_mode!r}. Available: None, 'rgb_array'.")
-        self.maze = maze if isinstance(maze, Maze) else Maze.load(maze)
-        self._goal_distance = GeodesicDistance(self.maze)
-        self._way = self._goal_distance(self.maze.base_pose[:2])
+        _check_one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
+        _check_one_of("action", action, task.ACTIONS)
+        _check_one_of("reward_type", reward_type, task.REWARDS)
+        _check_one_of("split", split, SPLITS)
+        _check_at_least("contact_penalty", contact_penalty, 0.0)
+        _check_at_least("success_hold_steps", success_hold_steps, 1, whole=True)
+        _check_at_least("image_size", image_size, 16, whole=True)
+        if goal_radius is not None and not (_is_number(goal_radius) and 0.0 < goal_radius < math.inf):
+            raise InputError(f"Expected a positive, finite goal_radius, or None, got {goal_radius!r}.")
+        self._random: dict[str, Any] | None = None
+        if isinstance(maze, str) and maze == "random":
+            link_length = RANDOM_LINK_LENGTH if link_length is None else link_length
+            n_links = RANDOM_N_LINKS if n_links is None else n_links
+            low, high = difficulty
+            self._random = {"difficulty": (float(low), float(high)), "link_length": link_length, "n_links": n_links}
+            maze = task_maze(split, 0, **self._random)
+        self._split, self._goal_radius = split, goal_radius
+        self._physics_options = {
+            "substeps": substeps,
+            "torque_limit": torque_limit,
+            "actuation": actuation,
+        }
+        first = self._with_goal(maze if isinstance(maze, Maze) else Maze.load(maze), None)
+        distance = GeodesicDistance(first)
         if link_length is None:
-            link_length = 1.5 * _mean_width(self.maze)
-        arm = ArmSpec(link_length=link_length, n_links=n_links, link_radius=link_radius)
-        self.maze.check_arm(arm)
+            link_length = 1.5 * _mean_width(first)
+        arm = ArmSpec(
+            link_length=link_length, n_links=n_links, link_radius=link_radius, joint_limit=joint_limit
+        )
+        first.check_arm(arm)
         if n_links is None:
             # A link more than a way 5 % longer takes: links cut corners less well than a string.
-            n_links = math.ceil(1.05 * self._way / link_length) + 1
-        self.arm = ArmSpec(link_length=link_length, n_links=n_links, link_radius=link_radius)
-        self.physics = Physics(
-            self.maze, self.arm, substeps=substeps, torque_limit=torque_limit, actuation=actuation
-        )
+            n_links = math.ceil(1.05 * distance(first.base_pose[:2]) / link_length) + 1
+        self.arm = dataclasses.replace(arm, n_links=n_links)
         self.render_mode = render_mode
         self.action_space = spaces.Box(-1.0, 1.0, (n_links + 1,), np.float32)
-        self.observation_space = task.observation_space(n_links)
+        self.observation_space = observation_space(observation, n_links, rays=rays, image_size=image_size)
+        self._mode, self._rays, self._image_size = observation, rays, image_size
+        self._absolute, self._reward_type, self._contact_penalty = action == "absolute", reward_type, contact_penalty
+        self._success_hold_steps = success_hold_steps
         self._terminate_on_collision = terminate_on_collision
-        self._step_limits = np.array([task.FEED_STEP * link_length, *([task.JOINT_STEP] * n_links)])
+        self._joint_limit = math.pi if joint_limit is None else joint_limit
+        self._reach = n_links * link_length
+        self._scales = np.array(
+            [link_length, task.FEED_STEP * link_length, task.JOINT_STEP, self._joint_limit]
+        )
+        self._ahead = np.array(AHEAD) * link_length
+        self._target, self._wanted = np.zeros(1 + n_links), np.zeros(1 + n_links)
+        self._no_rays = np.zeros(0)
         self._picture: MazePicture | None = None
-        self._distance = self._way
+        self._scenes: OrderedDict[tuple[Maze, tuple[float, ...]], _Scene] = OrderedDict()
+        self._first = maze if self._random is None else None
+        self._task_id = NO_TASK if self._random is None else 0
+        self._first_maze = first
+        self._enter(first, distance)
         self._start(0.0, np.zeros(n_links))
 
     # The Gymnasium interface
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start an episode; `options` may hold `feed` (maze units) and `joint_angles` (rad) to start from."""
-        super().reset(seed=seed)
-        options = options or {}
-        unknown = [key for key in options if key not in RESET_OPTIONS]
-        if unknown:
-            raise InputError(f"Unknown reset option {unknown[0]!r}. Available: {', '.join(RESET_OPTIONS)}.")
-        self._start(options.get("feed", 0.0), options.get("joint_angles", np.zeros(self.physics.n_links)))
-        outcome = task.StepOutcome(progress=0.0, collided=False, succeeded=False)
-        return self._observation(), self._info(outcome, ())
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start an episode.
 
-    def step(
-        self, action: NDArray[np.floating[Any]]
-    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Change the targets by an action, and simulate until the arm is there (see the class)."""
-        self._target = self._next_target(self._checked(action))
-        self.physics.advance(self._target[0], self._target[1:])
-        before, self._distance = self._distance, self._distance_now()
-        contacts = self.physics.pose_contacts
-        collided = any(contact.kind == "collision" for contact in contacts)
-        jammed = task.is_jammed(self.physics)
-        failed = jammed or (collided and self._terminate_on_collision)
-        outcome = task.StepOutcome(
-            progress=(before - self._distance) / self.arm.link_length,
-            collided=collided,
-            succeeded=not failed and self._tip_distance() <= self.maze.goal_radius,
+        Parameters
+        ----------
+        seed : int, optional
+            For `np_random`, from which random mazes are drawn.
+        options : dict, optional
+            `maze` (a Maze, a name or a file; for the same arm), `task_id` (which random maze), `goal` (x, y),
+            `feed` and `joint_angles` (maze units and rad), `motion` and `waypoint` (start at that pose of
+            anything with `feed`, shape (n_poses,), and `joint_angles`, shape (n_poses, n_links)), or `state`
+            (from `get_state`; the random numbers go on as they are).
+
+        Raises
+        ------
+        InputError
+            If an option is unknown, or an arm cannot start so: out of what the feeder allows, in a wall,
+            across itself, or with its tip at the goal.
+        """
+        super().reset(seed=seed)
+        wanted = ResetOptions.parse(options, self.arm)
+        if wanted.state is not None:
+            self._return_to(wanted.state)
+        else:
+            maze = self._wanted_maze(wanted)
+            self._enter(maze)
+            self._start(wanted.feed, wanted.joint_angles)
+        if self.render_mode == "human":
+            self.render()
+        return self.observe(), self._info()
+
+    def step(self, action: NDArray[np.floating[Any]]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Change the targets by an action, and simulate until the arm is there (see the class).
+
+        Raises
+        ------
+        InputError
+            If the action has another shape, or is not finite; nothing has happened then.
+        """
+        # A finer action than float32 keeps its digits.
+        values = np.asarray(action, dtype=np.float64)
+        if values.shape != self._target.shape:
+            raise InputError(f"Expected an action with shape {self._target.shape}, got {values.shape}.")
+        if self._tally.collided:
+            # What a wall has refused is not asked for again, or the arm would wind up and jam.
+            self.physics.take_back()
+            self._target[:] = self.physics.target
+        bad = task.next_target(
+            self._target, values, self._absolute, self.arm.link_length, self._joint_limit, self._wanted
         )
-        info = self._info(outcome, contacts)
-        reward = sum(task.reward_terms(outcome).values())
-        return self._observation(), reward, failed or outcome.succeeded, False, info
+        if bad >= 0:
+            raise InputError(f"Expected a finite action, got {values[bad]} at index {bad}.")
+        self._target, self._wanted = self._wanted, self._target
+        self.physics.advance(self._target[0], self._target[1:])
+        terminated, reward = self._judge()
+        if self.render_mode == "human":
+            self.render()
+        return self.observe(), reward, terminated, False, self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture of the arm in the maze, shape (height, width, 3); None without a render mode."""
@@ -208,78 +347,266 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             collided={contact.link for contact in touching if contact.kind == "collision"},
         )
         return self._picture.rgb()
+    def observe(self) -> Any:
+        """Return the present observation, as the last `reset` or `step` has."""
+        if self._mode == "image":
+            return self._image()
+        physics, goal = self.physics, self._mode == "state"
+        senses = physics.sense()
+        shape = self.observation_space if goal else self.observation_space["observation"]  # type: ignore[index]
+        vector = np.empty(shape.shape, dtype=np.float32)  # type: ignore[arg-type]
+        ahead = self._no_ahead
+        if goal and physics.finite:
+            ahead = self._scene.distance.ahead(senses.readings[1:3], self._ahead)
+        write_observation(
+            *senses,
+            self._target,
+            self._scales,
+            self.maze.base_pose,
+            goal,
+            self.maze.goal,
+            self._tally.distance / (2.0 * self._scene.way),
+            ahead,
+            physics.cast_rays() if self._rays else self._no_rays,
+            vector,
+        )
+        if goal:
+            return vector
+        return {
+            "observation": vector,
+            "achieved_goal": self._goal_place(senses.readings[1:3]),
+            "desired_goal": self._goal_place(self.maze.goal),
+        }
+
+    def compute_reward(
+        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Any
+    ) -> float | NDArray[np.float64]:
+        """Return the reward of the mode "goal", of one transition or of many.
+
+        Parameters
+        ----------
+        achieved_goal, desired_goal : array-like, shape (2,) or (n, 2)
+            As the observations have them.
+        info : dict, or sequence of n dicts
+            Of the transitions; without "collisions" in it, there were none.
+
+        Returns
+        -------
+        reward : float, or array with shape (n,)
+        """
+        terms = self._goal_terms(achieved_goal, desired_goal, info)
+        reward = sum(terms.values())
+        return float(reward) if np.ndim(reward) == 0 else np.asarray(reward, dtype=np.float64)
 
     def pinch_report(self) -> PinchReport:
         """Return whether links have merely pinched the walls since the reset, and where they collided."""
         return self.physics.report()
 
     @property
+    def physics(self) -> Physics:
+        """The simulator."""
+        return self._scene.physics
+
+    @property
+    def maze(self) -> Maze:
+        """The maze of this episode."""
+        return self._scene.maze
+
+    @property
     def target(self) -> FloatArray:
         """Where feed and joint angles were last sent, shape (1 + n_links,), in maze units and rad."""
         return self._target.copy()
 
+    # Saving and restoring
+
+    def get_state(self) -> EnvState:
+        """Return where the episode stands, without disturbing it; it goes on from there to the last bit.
+
+        The state holds all moves since the reset, or the last `snapshot`, and going back to it repeats them.
+        What wrappers count, such as the steps of a time limit, is not in it.
+        """
+        return self._state(self.physics.get_state())
+
+    def snapshot(self) -> EnvState:
+        """Return a state that is quick to go back to, for searching from it.
+
+        The simulator is built afresh at once, and so the episode may go on differently in the last digits
+        than without: but always as it does after `set_state`.
+        """
+        return self._state(self.physics.snapshot())
+
+    def set_state(self, state: EnvState) -> None:
+        """Go back to a state of this environment, or of one made alike, random numbers included."""
+        self._return_to(state)
+        self.np_random.bit_generator.state = state.rng
+
+    def _state(self, physics: PhysicsState) -> EnvState:
+        return EnvState(
+            maze=self.maze,
+            task_id=self._task_id,
+            target=self._target.copy(),
+            physics=physics,
+            tally=dataclasses.replace(self._tally, terms=dict(self._tally.terms)),
+            rng=self.np_random.bit_generator.state,  # type: ignore[arg-type]
+        )
+
+    def _return_to(self, state: Any) -> None:
+        if not isinstance(state, EnvState):
+            raise InputError(f"Expected a state from get_state or snapshot, got {type(state).__name__}.")
+        self._enter(state.maze)
+        self.physics.set_state(state.physics)
+        self._task_id = state.task_id
+        self._target = state.target.copy()
+        self._tally = dataclasses.replace(state.tally, terms=dict(state.tally.terms))
+
     # What it is made of
 
-    def _start(self, feed: float, joint_angles: Any) -> None:
-        self.physics.reset(feed, joint_angles)
-        self._target = self.physics.target
-        self._distance = self._way
-        self._distance = self._distance_now()
+    def _with_goal(self, maze: Maze, goal: FloatArray | None) -> Maze:
+        """Return a maze with the goal that is asked for."""
+        changes: dict[str, Any] = {} if goal is None else {"goal": goal}
+        if self._goal_radius is not None:
+            changes["goal_radius"] = self._goal_radius
+        return dataclasses.replace(maze, **changes) if changes else maze
 
-    def _checked(self, action: Any) -> FloatArray:
-        """Return an action as float64, cut to [-1, 1]: a finer action than float32 keeps its digits."""
-        values = np.asarray(action, dtype=np.float64)
-        if values.shape != self.action_space.shape:
-            raise InputError(f"Expected an action with shape {self.action_space.shape}, got {values.shape}.")
-        if not np.isfinite(values).all():
-            k = int(np.flatnonzero(~np.isfinite(values))[0])
-            raise InputError(f"Expected a finite action, got {values[k]} at index {k}.")
-        return np.clip(values, -1.0, 1.0)
+    def _wanted_maze(self, wanted: ResetOptions) -> Maze:
+        if wanted.task_id is not None and self._random is None:
+            raise InputError("Expected maze='random' for the reset option 'task_id', got another maze.")
+        maze, self._task_id = wanted.maze_given(), NO_TASK
+        if maze is None and self._random is not None:
+            n_tasks = N_TASKS[self._split]
+            task_id = int(self.np_random.integers(n_tasks)) if wanted.task_id is None else wanted.task_id
+            self._task_id, maze = task_id, task_maze(self._split, task_id, **self._random)
+        if maze is None:
+            maze = self._first_maze
+            return maze if wanted.goal is None else self._with_goal(maze, wanted.goal)
+        return self._with_goal(maze, wanted.goal)
 
-    def _next_target(self, action: FloatArray) -> FloatArray:
-        """Return the target after an action, scaled down until no joint's place moves too far."""
-        change, largest = action * self._step_limits, task.LARGEST_STEP * self.arm.link_length
-        for _ in range(20):
-            wanted = self._target + change
-            wanted[0] = min(max(wanted[0], 0.0), self.physics.n_links * self.arm.link_length)
-            targets: FloatArray = np.empty((1, len(wanted)))
-            step_targets(self._target, wanted, self.arm.link_length, targets)  # straight in the feeder
-            move = largest_move(self._target, targets, self.arm.link_length)
-            if move <= largest * (1.0 + 1e-6):
-                break
-            change *= largest / move
+    def _enter(self, maze: Maze, distance: GeodesicDistance | None = None) -> None:
+        """Make a maze the present one; its walls and distances are computed when it is new."""
+        scene = self._scenes.get(maze)
+        if scene is None:
+            maze.check_arm(self.arm)
+            distance = distance or GeodesicDistance(maze)
+            scene = _Scene(
+                maze=maze,
+                distance=distance,
+                way=distance(maze.base_pose[:2]),
+                physics=Physics(maze, self.arm, **self._physics_options),
+            )
+            self._scenes[maze] = scene
+            if len(self._scenes) > N_SCENES:
+                self._scenes.popitem(last=False)
+        self._scenes.move_to_end(maze)
+        self._scene = scene
+
+    def _start(self, feed: float, joint_angles: FloatArray) -> None:
+        physics = self.physics
+        physics.reset(feed, joint_angles)
+        self._target[:] = physics.target
+        self._tally = _Tally(distance=self._scene.way)
+        self._tally.distance = self._distance_now()
+        if feed > 0.0:
+            self._check_start()
+
+    def _check_start(self) -> None:
+        """Refuse a start in a wall, across itself, or at the goal."""
+        self.physics.settle()  # lets the simulator see what touches
+        for contact in self.physics.pose_contacts:
+            if contact.kind == "collision":
+                what = "a wall" if contact.other is None else f"link {contact.other}"
+                raise InputError(
+                    f"Expected a start clear of the walls, got link {contact.link} {-contact.clearance:.3g} "
+                    f"{self.maze.units} deep in {what} at ({contact.point[0]:g}, {contact.point[1]:g})."
+                )
+        if self._tip_distance() <= self.maze.goal_radius:
+            raise InputError("Expected a start outside the goal's radius, got one with the tip at the goal.")
+        self._tally.see(self.physics.pose_contacts)
+
+    def _judge(self) -> tuple[bool, float]:
+        """Return whether the step has ended the episode, and its reward."""
+        tally, physics, length = self._tally, self.physics, self.arm.link_length
+        tally.see(physics.pose_contacts)
+        before, tally.distance = tally.distance, self._distance_now()
+        jammed = (
+            not physics.finite
+            or physics.node_error > task.JAM_NODE_ERROR * length
+            or physics.drift > task.JAM_DRIFT * length
+        )
+        failed = jammed or (tally.collided and self._terminate_on_collision)
+        at_goal = not failed and self._tip_distance() <= self.maze.goal_radius
+        tally.at_goal = tally.at_goal + 1 if at_goal else 0
+        tally.succeeded = tally.at_goal >= self._success_hold_steps
+        if self._mode == "goal":
+            place, goal = self._goal_place(physics.sense().readings[1:3]), self._goal_place(self.maze.goal)
+            terms = self._goal_terms(place, goal, {"collisions": tally.collisions})
+            tally.terms = {name: float(value) for name, value in terms.items()}
         else:
-            return self._target
-        return np.ascontiguousarray(targets[0])
+            tally.terms = task.reward_terms(
+                self._reward_type,
+                progress=(before - tally.distance) / length,
+                collided=tally.collided,
+                succeeded=tally.succeeded,
+                contact_penalty=self._contact_penalty,
+            )
+        reward = sum(tally.terms.values())
+        tally.steps += 1
+        tally.total_reward += reward
+        return failed or tally.succeeded, reward
+
+    def _goal_place(self, point: FloatArray) -> NDArray[np.float32]:
+        """Return a place relative to the base, as a share of the arm's length."""
+        place = (point - self.maze.base_pose[:2]) / self._reach
+        return np.clip(np.nan_to_num(place), -1.0, 1.0).astype(np.float32)
+
+    def _goal_terms(self, achieved: ArrayLike, desired: ArrayLike, info: Any) -> dict[str, Any]:
+        offset = np.asarray(achieved, dtype=np.float64) - np.asarray(desired, dtype=np.float64)
+        infos = [info] if isinstance(info, dict) else list(info)
+        collided = np.array([entry.get("collisions", 0) > 0 for entry in infos])
+        return task.goal_reward_terms(
+            self._reward_type,
+            distance=np.linalg.norm(offset, axis=-1),
+            goal_radius=self.maze.goal_radius / self._reach,
+            collided=collided[0] if isinstance(info, dict) else collided,
+            contact_penalty=self._contact_penalty,
+        )
 
     def _tip_distance(self) -> float:
-        return float(np.linalg.norm(self.physics.tip_position - self.maze.goal))
+        readings, goal = self.physics.sense().readings, self._goal
+        return math.hypot(readings[1] - goal[0], readings[2] - goal[1])
 
     def _distance_now(self) -> float:
         """Return the way from the tip to the goal; with the tip in a wall, what it was before."""
-        distance = self._goal_distance(self.physics.tip_position) if self.physics.finite else math.inf
-        return distance if math.isfinite(distance) else self._distance
+        if not self.physics.finite:
+            return self._tally.distance
+        distance = self._scene.distance(self.physics.sense().readings[1:3])
+        return distance if math.isfinite(distance) else self._tally.distance
 
-    def _observation(self) -> NDArray[np.float32]:
-        return task.observation(self.physics, self._target, min(self._distance / (2.0 * self._way), 1.0))
-
-    def _info(self, outcome: task.StepOutcome, contacts: tuple[Contact, ...]) -> dict[str, Any]:
+    def _info(self) -> dict[str, Any]:
+        tally, physics = self._tally, self.physics
+        readings = physics.sense().readings
         return {
-            "success": outcome.succeeded,
-            "is_success": outcome.succeeded,
-            "feed": self.physics.feed,
+            "success": tally.succeeded,
+            "is_success": tally.succeeded,
+            "progress": 1.0 - tally.distance / self._scene.way,
+            "feed": float(readings[0]),
             "tip_distance": self._tip_distance(),
-            "goal_distance": self._distance,
-            "clearance": float(self.physics.clearance.min()),
-            "pinches": len({contact.link for contact in contacts if contact.kind == "pinch"}),
-            "collisions": len({contact.link for contact in contacts if contact.kind == "collision"}),
-            "depth": max(
-                (-contact.clearance for contact in contacts if contact.clearance < 0.0), default=0.0
-            ),
-            "impulse": max((contact.impulse for contact in contacts), default=0.0),
-            "node_error": self.physics.node_error,
-            "drift": self.physics.drift,
-            **task.reward_terms(outcome),
+            "goal_distance": tally.distance,
+            "clearance": float(readings[5]),
+            "pinches": tally.pinches,
+            "collisions": tally.collisions,
+            "depth": tally.depth,
+            "impulse": tally.impulse,
+            "joint_torques": physics.torques,
+            "node_error": physics.node_error,
+            "drift": physics.drift,
+            "task_id": self._task_id,
+            **tally.terms,
+            "total_steps": tally.steps,
+            "total_reward": tally.total_reward,
+            "total_pinches": tally.total_pinches,
+            "total_collisions": tally.total_collisions,
+            "worst_depth": tally.worst_depth,
+            "worst_impulse": tally.worst_impulse,
         }
 
 
