@@ -1,133 +1,433 @@
-"""How far it is to the goal through the free space: a distance that knows of the walls."""
+"""How far it is to the goal through the free space, and which way: exactly, round the walls' corners."""
 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike
-from scipy.sparse import coo_array
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 
-__all__ = ["GeodesicDistance"]
+__all__ = ["GeodesicDistance", "Ways", "distance_at", "look_ahead"]
 
-CELLS = 200
-"""Grid cells along the maze's diagonal, to begin with."""
+CELLS_PER_WIDTH = 8
+"""Grid cells across the mean width of the free space."""
 
-FINE_CELLS = 800
-MAX_CELLS = 1600
-"""The grid is refined up to these: to tell the sides of a thin wall apart, and to find a way at all."""
+MAX_CELLS = 1000
+"""Along the maze's diagonal: narrower mazes have coarser grids, which cost time at a query, not exactness."""
 
-STEPS = ((1, 0), (0, 1), (1, 1), (1, -1), (2, 1), (1, 2), (2, -1), (1, -2))
-"""Half of the 16 neighbours of a grid node; the distances are then at most 2.8 % too long."""
+OFF_WALL = 1e-7
+"""In cells. Ways keep this far off the walls: rounding then never decides whether a wall is in the way."""
+
+MARGIN = 1e-6
+"""In cells. A wall is listed in all cells that it comes this near to."""
+
+NEAR = 3
+"""In cells. Round a corner nodes are tried this far; farther ones only next to one whose way it is."""
+
+
+class Ways(NamedTuple):
+    """Hold the shortest ways to the goal as plain arrays, for kernels.
+
+    A shortest way runs straight from bend to bend, and bends at the walls' convex corners alone. Lengths and
+    places are in grid cells, from the grid's origin: node (i, j) is at (i, j), cell (i, j) right above it.
+    """
+
+    origin_x: float
+    """The grid's origin, in maze units."""
+    origin_y: float
+    cell: float
+    """Side of a cell, in maze units."""
+    first: NDArray[np.int32]
+    """The first bend of the way from each node, shape (n_x, n_y); -1 in walls."""
+    bends: FloatArray
+    """The goal, then the corners, shape (n_bends, 2)."""
+    lengths: FloatArray
+    """Of the way from each bend, shape (n_bends,)."""
+    onward: NDArray[np.int32]
+    """The bend after each bend, shape (n_bends,)."""
+    walls: FloatArray
+    """Start and end of each wall, shape (n_walls, 4)."""
+    corner: NDArray[np.int32]
+    """The bend at the start of each wall, or -1, shape (n_walls,)."""
+    begins: NDArray[np.int32]
+    """Where the list of each cell's walls begins in `listed`, shape (n_x * n_y + 1,)."""
+    listed: NDArray[np.int32]
 
 
 class GeodesicDistance:
-    """Tell how far it is from any place to the goal without crossing a wall.
+    """Tell how far it is from any place to the goal without crossing a wall, and where the way goes.
 
-    Computed once on a grid (Dijkstra's algorithm), then interpolated. The grid is refined where it must be:
-    until the base is joined to the goal, and, within reason, until no cell has both sides of a wall.
+    The ways are exact: they bend at the walls' corners, whose ways come from Dijkstra's algorithm on the graph
+    of corners that see each other. A grid keeps the first bend of the way from each node; a query tries the
+    bends of the nodes around. The distance changes by no more than the length of a step (within 1e-6 cells
+    and, very rarely, by more where the nodes around miss a bend), and falls all along the way.
 
     Parameters
     ----------
     maze : Maze
         The maze.
+    goal : array-like, shape (2,), optional
+        In maze units; by default the maze's.
 
     Raises
     ------
     InputError
-        If the way is too narrow even for the finest grid.
+        If the goal is not in the free space, or the way is too narrow for floating-point numbers.
     """
 
-    def __init__(self, maze: Maze) -> None:
-        self._goal = np.asarray(maze.goal)
-        shapely.prepare(maze.free_space)
-        cells = CELLS
-        while True:
-            self._cell = maze.size / cells
-            self._build(maze)
-            joined = math.isfinite(self(maze.base_pose[:2]))
-            cells *= 2
-            if joined and (cells > FINE_CELLS or self._tells_sides_apart()):
-                return
-            if cells > MAX_CELLS:
-                raise InputError(
-                    f"Expected a way to the goal of maze '{maze.name}' that is wider than "
-                    f"{2 * self._cell:g} {maze.units}, got a narrower one."
-                )
+    def __init__(self, maze: Maze, goal: ArrayLike | None = None) -> None:
+        place = np.array(maze.goal if goal is None else goal, dtype=np.float64)
+        if place.shape != (2,) or not shapely.contains_xy(maze.free_space, *place):
+            raise InputError(f"Expected a goal (x, y) in the free space, got {place.tolist()}.")
+        self.ways = _frozen(_ways(maze, place))
+        if not math.isfinite(self(maze.base_pose[:2])):
+            raise InputError(
+                f"Expected a way to the goal of maze '{maze.name}' that is wider than "
+                f"{2 * OFF_WALL * self.ways.cell:g} {maze.units}, got a narrower one."
+            )
 
     def __call__(self, point: ArrayLike) -> float:
         """Return the distance from a point, shape (2,), in maze units; infinite far inside a wall."""
-        x, y = (np.asarray(point, dtype=np.float64) - self._origin) / self._cell
-        rows, columns = self._grid.shape
-        i, j = min(max(int(x), 0), rows - 2), min(max(int(y), 0), columns - 2)
-        u, v = min(max(x - i, 0.0), 1.0), min(max(y - j, 0.0), 1.0)
-        total, weight = 0.0, 0.0
-        for di, dj, share in (
-            (0, 0, (1 - u) * (1 - v)),
-            (1, 0, u * (1 - v)),
-            (0, 1, (1 - u) * v),
-            (1, 1, u * v),
-        ):
-            value = self._grid[i + di, j + dj]
-            if value < math.inf:
-                share = max(share, 1e-9)  # a point on a grid line next to a wall
-                total, weight = total + share * value, weight + share
-        return float(total / weight) if weight > 0.0 else math.inf
+        x, y = np.asarray(point, dtype=np.float64)
+        return float(distance_at(self.ways, x, y))
 
-    def _build(self, maze: Maze) -> None:
-        """Compute the distance of all grid nodes in the free space; the others are infinitely far."""
-        x_min, y_min, x_max, y_max = maze.free_space.bounds
-        # Half a cell off the walls of mazes in round numbers, along which no node could be free.
-        self._origin = np.array([x_min, y_min]) - 0.5 * self._cell
-        shape = (math.ceil((x_max - x_min) / self._cell) + 2, math.ceil((y_max - y_min) / self._cell) + 2)
-        x, y = (self._origin[axis] + self._cell * np.arange(shape[axis]) for axis in (0, 1))
-        nodes = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-        free = shapely.contains_xy(maze.free_space, nodes[:, 0], nodes[:, 1])
-        starts, ends = self._edges(maze, nodes, free, shape)
-        near_goal = np.flatnonzero(free & (np.linalg.norm(nodes - self._goal, axis=1) <= 3 * self._cell))
-        lines = shapely.linestrings(
-            np.stack([nodes[near_goal], np.broadcast_to(self._goal, (len(near_goal), 2))], 1)
-        )
-        near_goal = near_goal[shapely.covers(maze.free_space, lines)]
-        starts = np.concatenate([starts, near_goal])
-        ends = np.concatenate([ends, np.full(len(near_goal), len(nodes))])
-        places = np.concatenate([nodes, self._goal[None]])
-        lengths = np.maximum(np.linalg.norm(places[starts] - places[ends], axis=1), 1e-9 * self._cell)
-        graph = coo_array((lengths, (starts, ends)), shape=(len(places), len(places))).tocsr()
-        self._grid = dijkstra(graph, directed=False, indices=len(nodes))[:-1].reshape(shape)
+    def ahead(self, point: ArrayLike, distances: ArrayLike) -> FloatArray:
+        """Return the places on the way to the goal at some distances ahead of a point.
 
-    def _tells_sides_apart(self) -> bool:
-        corners = np.stack(
-            [self._grid[:-1, :-1], self._grid[1:, :-1], self._grid[:-1, 1:], self._grid[1:, 1:]]
-        )
-        finite = np.isfinite(corners)
-        highest = np.max(corners, axis=0, where=finite, initial=0.0)
-        lowest = np.min(corners, axis=0, where=finite, initial=math.inf)
-        return not np.any(highest - lowest > 8.0 * self._cell)
+        Parameters
+        ----------
+        point : array-like, shape (2,)
+            In maze units.
+        distances : array-like, shape (n,)
+            Along the way, in maze units, not negative.
 
-    def _edges(
-        self, maze: Maze, nodes: FloatArray, free: np.ndarray, shape: tuple[int, int]
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Join neighbouring free nodes, where no wall stands in between."""
-        index = np.arange(len(nodes)).reshape(shape)
-        starts, ends = [], []
-        for di, dj in STEPS:
-            a = index[: shape[0] - di, max(0, -dj) : shape[1] - max(0, dj)].ravel()
-            b = index[di:, max(0, dj) : shape[1] - max(0, -dj)].ravel()
-            both = free[a] & free[b]
-            starts.append(a[both])
-            ends.append(b[both])
-        start, end = np.concatenate(starts), np.concatenate(ends)
-        # An edge is at most 2.24 cells long: only nodes this near to a wall can have one that crosses it.
-        near = np.zeros(len(nodes), dtype=bool)
-        near[free] = shapely.dwithin(shapely.points(nodes[free]), maze.free_space.boundary, 2.3 * self._cell)
-        doubtful = np.flatnonzero(near[start] & near[end])
-        lines = shapely.linestrings(np.stack([nodes[start[doubtful]], nodes[end[doubtful]]], axis=1))
-        crossing = doubtful[~shapely.covers(maze.free_space, lines)]
-        return np.delete(start, crossing), np.delete(end, crossing)
+        Returns
+        -------
+        places : array, shape (n, 2)
+            In maze units: the goal where it is nearer, and the point itself far inside a wall.
+        """
+        x, y = np.asarray(point, dtype=np.float64)
+        along = np.ascontiguousarray(distances, dtype=np.float64)
+        places = np.empty((len(along), 2))
+        look_ahead(self.ways, x, y, along, places)
+        return places
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Make the arrays read-only again, which pickle forgets."""
+        self.ways = _frozen(state["ways"])
+
+
+def _frozen(ways: Ways) -> Ways:
+    for array in ways:
+        if isinstance(array, np.ndarray):
+            array.setflags(write=False)
+    return ways
+
+
+def _ways(maze: Maze, goal: FloatArray) -> Ways:
+    """Find the shortest ways from all corners and grid nodes."""
+    mean_width = 2.0 * maze.free_space.area / maze.free_space.length
+    cell = max(mean_width / CELLS_PER_WIDTH, maze.size / MAX_CELLS)
+    low, high = np.reshape(maze.free_space.bounds, (2, 2))
+    origin = low - 1.5 * cell
+    n_x, n_y = (np.ceil((high - origin) / cell) + 2).astype(int)
+    rings = [(ring - origin) / cell for ring in maze.rings]
+    walls = np.concatenate([np.hstack([ring[:-1], ring[1:]]) for ring in rings])
+    corner, places, ends = _corners(rings)
+    begins, listed = _listed(walls, n_x, n_y)
+    ways = Ways(
+        origin_x=float(origin[0]),
+        origin_y=float(origin[1]),
+        cell=float(cell),
+        first=np.full((n_x, n_y), -1, dtype=np.int32),
+        bends=np.concatenate([((goal - origin) / cell)[None], places]),
+        lengths=np.full(1 + len(places), math.inf),
+        onward=np.zeros(1 + len(places), dtype=np.int32),
+        walls=walls,
+        corner=corner,
+        begins=begins,
+        listed=listed,
+    )
+    ways.bends[0] = _off_walls(ways, *ways.bends[0])
+    pairs = _bends_in_sight(ways, ends)
+    gaps = np.linalg.norm(ways.bends[pairs[:, 0]] - ways.bends[pairs[:, 1]], axis=1)
+    graph = csr_array((gaps, (pairs[:, 0], pairs[:, 1])), shape=(len(ends), len(ends)))
+    ways.lengths[:], onward = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
+    ways.onward[:] = np.maximum(onward, 0)
+    reached = np.flatnonzero(np.isfinite(ways.lengths))
+    _spread(ways, reached[np.argsort(ways.lengths[reached])])
+    return ways
+
+
+def _corners(rings: list[FloatArray]) -> tuple[NDArray[np.int32], FloatArray, FloatArray]:
+    """Find the walls' convex corners.
+
+    Returns
+    -------
+    corner : array, shape (n_walls,)
+        The bend at the start of each wall (the goal being bend 0), or -1.
+    places : array, shape (n_corners, 2)
+        The corners, a little off the wall.
+    ends : array, shape (1 + n_corners, 4)
+        The directions in which the two walls of each bend leave it; zeros for the goal.
+    """
+    corner, places, ends = [], [], [np.zeros((1, 4))]
+    for ring in rings:
+        after = np.diff(ring, axis=0)
+        after /= np.linalg.norm(after, axis=1)[:, None]
+        before = np.roll(after, 1, axis=0)
+        convex = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] < 0.0  # the free space is on the left
+        outward = (before + after)[convex] @ np.array([[0.0, 1.0], [-1.0, 0.0]])
+        outward /= np.linalg.norm(outward, axis=1)[:, None]
+        corner.append(convex)
+        places.append(ring[:-1][convex] + 2.0 * OFF_WALL * outward)
+        ends.append(np.hstack([-before[convex], after[convex]]))
+    is_corner = np.concatenate(corner)
+    numbers = np.where(is_corner, np.cumsum(is_corner), -1).astype(np.int32)
+    return numbers, np.concatenate(places), np.concatenate(ends)
+
+
+@numba.njit(cache=True)
+def distance_at(ways: Ways, x: float, y: float) -> float:
+    """Return the distance from a place to the goal, in maze units; infinite far inside a wall."""
+    _, _, _, length = _way_from(ways, (x - ways.origin_x) / ways.cell, (y - ways.origin_y) / ways.cell)
+    return length * ways.cell
+
+
+@numba.njit(cache=True)
+def look_ahead(ways: Ways, x: float, y: float, distances: FloatArray, places: FloatArray) -> None:
+    """Write the places at some distances ahead of (x, y) on the way to the goal, all in maze units."""
+    u, v = (x - ways.origin_x) / ways.cell, (y - ways.origin_y) / ways.cell
+    start_u, start_v, first, length = _way_from(ways, u, v)
+    for k in range(len(distances)):
+        left = min(distances[k] / ways.cell, length)
+        here_u, here_v, next_u, next_v, bend = u, v, start_u, start_v, first
+        while length < math.inf:
+            gap = math.hypot(next_u - here_u, next_v - here_v)
+            if left <= gap or (next_u == ways.bends[0, 0] and next_v == ways.bends[0, 1]):
+                share = min(left / gap, 1.0) if gap > 0.0 else 0.0
+                here_u, here_v = here_u + share * (next_u - here_u), here_v + share * (next_v - here_v)
+                break
+            left -= gap
+            here_u, here_v = next_u, next_v
+            next_u, next_v, bend = ways.bends[bend, 0], ways.bends[bend, 1], ways.onward[bend]
+        places[k, 0] = ways.origin_x + ways.cell * here_u
+        places[k, 1] = ways.origin_y + ways.cell * here_v
+
+
+@numba.njit(cache=True)
+def _way_from(ways: Ways, x: float, y: float) -> tuple[float, float, int, float]:
+    """Return where the way from a place begins in the free space, its first bend, and its length."""
+    n_x, n_y = ways.first.shape
+    if not (0.0 <= x < n_x - 1 and 0.0 <= y < n_y - 1):
+        return x, y, -1, math.inf
+    start_x, start_y = _off_walls(ways, x, y)
+    bend, length = _first_bend(ways, start_x, start_y)
+    if bend < 0:  # in a wall: begin at its surface
+        start_x, start_y = _nearest_on_walls(ways, x, y)
+        if start_x < math.inf:
+            start_x, start_y = _off_walls(ways, start_x, start_y)
+            bend, length = _first_bend(ways, start_x, start_y)
+    return start_x, start_y, bend, length + math.hypot(start_x - x, start_y - y)
+
+
+@numba.njit(cache=True)
+def _first_bend(ways: Ways, x: float, y: float) -> tuple[int, float]:
+    """Return the first bend of the shortest way from a place, and the way's length; -1 in a wall."""
+    i, j = int(x), int(y)
+    best, length = -1, math.inf
+    for di in range(2):
+        for dj in range(2):
+            best, length = _nearer(ways, x, y, ways.first[i + di, j + dj], best, length)
+    c = i * ways.first.shape[1] + j
+    for k in range(ways.begins[c], ways.begins[c + 1]):
+        best, length = _nearer(ways, x, y, ways.corner[ways.listed[k]], best, length)
+    if best < 0:  # in a gap between the nodes, or in a wall
+        for bend in range(len(ways.bends)):
+            best, length = _nearer(ways, x, y, bend, best, length)
+    tried = -1
+    while best > 0 and best != tried:  # a bend may be left out, as a taut string leaves it
+        tried = best
+        best, length = _nearer(ways, x, y, ways.onward[best], best, length)
+    return best, length
+
+
+@numba.njit(cache=True)
+def _nearer(ways: Ways, x: float, y: float, bend: int, best: int, length: float) -> tuple[int, float]:
+    """Return the better of two first bends, the second of which is in sight, and the way's length."""
+    if bend < 0 or bend == best:
+        return best, length
+    other = ways.lengths[bend] + math.hypot(ways.bends[bend, 0] - x, ways.bends[bend, 1] - y)
+    if other < length and _sees(ways, x, y, ways.bends[bend, 0], ways.bends[bend, 1]):
+        return bend, other
+    return best, length
+
+
+@numba.njit(cache=True)
+def _sees(ways: Ways, ax: float, ay: float, bx: float, by: float) -> bool:
+    """Tell whether no wall touches the line from a to b, going through the cells on it."""
+    i, j, last_i, last_j = int(ax), int(ay), int(bx), int(by)
+    dx, dy = bx - ax, by - ay
+    step_i, step_j = 1 if dx > 0.0 else -1, 1 if dy > 0.0 else -1
+    pace_x, pace_y = abs(1.0 / dx) if dx != 0.0 else math.inf, abs(1.0 / dy) if dy != 0.0 else math.inf
+    # When, between 0 at a and 1 at b, the line comes to the next column and to the next row of cells.
+    next_x = ((i + 1 - ax) if dx > 0.0 else (ax - i)) * pace_x if dx != 0.0 else math.inf
+    next_y = ((j + 1 - ay) if dy > 0.0 else (ay - j)) * pace_y if dy != 0.0 else math.inf
+    n_y = ways.first.shape[1]
+    while True:
+        c = i * n_y + j
+        for k in range(ways.begins[c], ways.begins[c + 1]):
+            if _crosses(ways.walls, ways.listed[k], ax, ay, bx, by):
+                return False
+        if i == last_i and j == last_j:
+            return True
+        if j == last_j or (i != last_i and next_x < next_y):
+            i += step_i
+            next_x += pace_x
+        else:
+            j += step_j
+            next_y += pace_y
+
+
+@numba.njit(cache=True)
+def _crosses(walls: FloatArray, k: int, ax: float, ay: float, bx: float, by: float) -> bool:
+    """Tell whether a wall crosses or touches the line from a to b, or ends on it."""
+    px, py = walls[k, 0], walls[k, 1]
+    wx, wy = walls[k, 2] - px, walls[k, 3] - py
+    side_a = wx * (ay - py) - wy * (ax - px)
+    side_b = wx * (by - py) - wy * (bx - px)
+    if (side_a > 0.0 and side_b > 0.0) or (side_a < 0.0 and side_b < 0.0):
+        return False
+    if side_a == 0.0 and side_b == 0.0:  # on the line of a wall: neither end is within OFF_WALL of it
+        return False
+    dx, dy = bx - ax, by - ay
+    side_p = dx * (py - ay) - dy * (px - ax)
+    side_q = side_p + dx * wy - dy * wx
+    return not ((side_p > 0.0 and side_q > 0.0) or (side_p < 0.0 and side_q < 0.0))
+
+
+@numba.njit(cache=True)
+def _off_walls(ways: Ways, x: float, y: float) -> tuple[float, float]:
+    """Return the place OFF_WALL in front of a wall, if (x, y) is nearer to one than that."""
+    c = int(x) * ways.first.shape[1] + int(y)
+    for _ in range(2):  # in a corner, off either wall
+        for k in range(ways.begins[c], ways.begins[c + 1]):
+            wall = ways.listed[k]
+            near_x, near_y = _nearest_on_wall(ways.walls, wall, x, y)
+            if math.hypot(x - near_x, y - near_y) >= OFF_WALL:
+                continue
+            wx, wy = ways.walls[wall, 2] - ways.walls[wall, 0], ways.walls[wall, 3] - ways.walls[wall, 1]
+            share = 1.5 * OFF_WALL / math.hypot(wx, wy)
+            x, y = near_x - share * wy, near_y + share * wx
+    return x, y
+
+
+@numba.njit(cache=True)
+def _nearest_on_wall(walls: FloatArray, k: int, x: float, y: float) -> tuple[float, float]:
+    px, py = walls[k, 0], walls[k, 1]
+    wx, wy = walls[k, 2] - px, walls[k, 3] - py
+    share = min(max(((x - px) * wx + (y - py) * wy) / (wx * wx + wy * wy), 0.0), 1.0)
+    return px + share * wx, py + share * wy
+
+
+@numba.njit(cache=True)
+def _nearest_on_walls(ways: Ways, x: float, y: float) -> tuple[float, float]:
+    """Return the nearest place on a wall; infinite if it is more than a cell away."""
+    n_x, n_y = ways.first.shape
+    best_x, best_y, least = math.inf, math.inf, 1.0
+    for i in range(max(int(x) - 1, 0), min(int(x) + 2, n_x)):
+        for c in range(i * n_y + max(int(y) - 1, 0), i * n_y + min(int(y) + 2, n_y)):
+            for k in range(ways.begins[c], ways.begins[c + 1]):
+                near_x, near_y = _nearest_on_wall(ways.walls, ways.listed[k], x, y)
+                gap = math.hypot(near_x - x, near_y - y)
+                if gap < least:
+                    best_x, best_y, least = near_x, near_y, gap
+    return best_x, best_y
+
+
+@numba.njit(cache=True)
+def _listed(walls: FloatArray, n_x: int, n_y: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """List the walls of each cell; returns `Ways.begins` and `Ways.listed`."""
+    begins = np.zeros(n_x * n_y + 1, dtype=np.int32)
+    listed = np.empty(0, dtype=np.int32)
+    for fill in (False, True):
+        for wall in range(len(walls)):
+            px, py, qx, qy = walls[wall]
+            if px > qx:
+                px, py, qx, qy = qx, qy, px, py
+            for i in range(int(px - MARGIN), int(qx + MARGIN) + 1):
+                # The part of the wall in this column of cells.
+                a, b = 0.0, 1.0
+                if qx > px:
+                    a = min(max((i - MARGIN - px) / (qx - px), 0.0), 1.0)
+                    b = min(max((i + 1 + MARGIN - px) / (qx - px), 0.0), 1.0)
+                low = min(py + a * (qy - py), py + b * (qy - py)) - MARGIN
+                high = max(py + a * (qy - py), py + b * (qy - py)) + MARGIN
+                for j in range(int(low), int(high) + 1):
+                    c = i * n_y + j
+                    if fill:
+                        begins[c] -= 1
+                        listed[begins[c]] = wall
+                    else:
+                        begins[c] += 1
+        if not fill:
+            begins[:] = np.cumsum(begins)
+            listed = np.empty(begins[-1], dtype=np.int32)
+    return begins, listed
+
+
+@numba.njit(cache=True)
+def _bends_in_sight(ways: Ways, ends: FloatArray) -> NDArray[np.int64]:
+    """Return the pairs of bends that see each other, and at both of which a taut string could bend."""
+    pairs = [(0, 0) for _ in range(0)]
+    for a in range(len(ends)):
+        for b in range(a):
+            dx, dy = ways.bends[b, 0] - ways.bends[a, 0], ways.bends[b, 1] - ways.bends[a, 1]
+            if not (_grazes(ends[a], dx, dy) and _grazes(ends[b], dx, dy)):
+                continue
+            if _sees(ways, ways.bends[a, 0], ways.bends[a, 1], ways.bends[b, 0], ways.bends[b, 1]):
+                pairs.append((a, b))
+    return np.array(pairs).reshape(-1, 2)
+
+
+@numba.njit(cache=True)
+def _grazes(ends: FloatArray, dx: float, dy: float) -> bool:
+    """Tell whether a line passes by a corner with both of its walls on one side."""
+    one, other = dx * ends[1] - dy * ends[0], dx * ends[3] - dy * ends[2]
+    tolerance = 1e-5
+    return not (min(one, other) < -tolerance and max(one, other) > tolerance)
+
+
+@numba.njit(cache=True)
+def _spread(ways: Ways, order: NDArray[np.int64]) -> None:
+    """Find the first bend of the way from each node: spread from each bend in the order of their lengths."""
+    n_x, n_y = ways.first.shape
+    lengths = np.full((n_x, n_y), math.inf)
+    tried = np.full((n_x, n_y), -1, dtype=np.int32)
+    stack = np.empty((n_x * n_y, 2), dtype=np.int32)
+    for bend in order:
+        x, y = ways.bends[bend]
+        n, reach, i, j = 0, NEAR, int(x), int(y)
+        while n >= 0:
+            for a in range(max(i - reach, 0), min(i + reach + 1, n_x)):
+                for b in range(max(j - reach, 0), min(j + reach + 1, n_y)):
+                    if tried[a, b] == bend:
+                        continue
+                    tried[a, b] = bend
+                    length = ways.lengths[bend] + math.hypot(x - a, y - b)
+                    if length < lengths[a, b] and _sees(ways, a, b, x, y):
+                        lengths[a, b], ways.first[a, b] = length, bend
+                        stack[n] = a, b
+                        n += 1
+            n, reach = n - 1, 1
+            if n >= 0:
+                i, j = stack[n]
