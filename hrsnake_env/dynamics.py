@@ -306,7 +306,9 @@ def deviation(
 
 
 @numba.njit(cache=True)
-def divide(start: FloatArray, end: FloatArray, link_length: float, largest: float, targets: FloatArray) -> int:
+def divide(
+    start: FloatArray, end: FloatArray, link_length: float, largest: float, targets: FloatArray
+) -> int:
     """Divide a change of the configuration into the rows of `targets`, as `step_targets` does.
 
     Returns

@@ -23,7 +23,7 @@ from hrsnake_env.maze import Maze
 from hrsnake_env.observation import AHEAD, observation_space, write_observation
 from hrsnake_env.options import ResetOptions
 from hrsnake_env.physics import CONTROL_TIMESTEP, Physics, PhysicsState
-from hrsnake_env.random_mazes import N_TASKS, RANDOM_LINK_LENGTH, RANDOM_N_LINKS, SPLITS, task_maze
+from hrsnake_env.random_mazes import LINK_LENGTH, N_LINKS, N_TEST_TASKS, N_TRAIN_TASKS, SPLITS, task_maze
 from hrsnake_env.rendering import MazePicture
 
 __all__ = ["EnvState", "HyperRedundantMazeEnv"]
@@ -105,44 +105,99 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
 
     ## Action Space
 
-    `Box(-1, 1, (n_links + 1,), float32)`: the change of the feed's target in units of 0.02 link lengths, then
-    the change of each joint's target, base end first, in units of 0.05 rad (counter-clockwise positive).
-    Larger actions are cut. Joints that have not passed the base stay straight, whatever their action. If the
-    change would move any joint's place by more than 0.05 link lengths, all of it is scaled down to that.
+    `Box(-1, 1, (n_links + 1,), float32)`; larger actions are cut. Joints are counted from the base end,
+    angles are counter-clockwise positive.
+
+    | number      | with `action="delta"`                                   | with `action="absolute"`                                       |
+    |-------------|---------------------------------------------------------|----------------------------------------------------------------|
+    | 0           | change of the feed's target, in 0.02 link lengths       | the feed's target: -1 is none of the arm, 1 all of it          |
+    | 1 ... n_links | change of each joint's target, in 0.05 rad            | each joint's target, in shares of the joint limit (or of pi)   |
+
+    Absolute targets are approached by the changes that an action of 1 makes. Joints that have not passed the
+    base stay straight, whatever their action: their angle is cut to 16 rad per link length that they are past
+    it. If the change would move any joint's place by more than 0.05 link lengths, all of it is scaled down to
+    that. What a wall has refused is not asked for again: after a collision the targets are where the arm is.
 
     ## Observation Space
 
-    `Box(low, 1, (4 * n_links + 8,), float32)`; everything is cut to its bounds.
+    `observation="state"`: `Box(low, 1, (5 * n_links + 16,), float32)`; with `rays=True` 8 + 2 * n_links
+    numbers more. Everything is cut to its bounds. The reach is the length of the arm.
 
-    | part          | number      | meaning                                                      | min | max |
-    |---------------|-------------|--------------------------------------------------------------|-----|-----|
-    | feed          | 1           | length of arm past the base / length of the arm              | 0   | 1   |
-    | joint_angles  | n_links     | relative to the previous link / pi                           | -1  | 1   |
-    | target_errors | 1 + n_links | target minus feed and joint angles / largest change in a step| -1  | 1   |
-    | speeds        | 1 + n_links | of feed and joint angles / largest change in a step          | -1  | 1   |
-    | goal_offset   | 2           | x and y from the tip to the goal / size of the maze          | -1  | 1   |
-    | tip_heading   | 2           | cosine and sine                                              | -1  | 1   |
-    | goal_distance | 1           | from the tip round the walls / the same from the base, halved| 0   | 1   |
-    | clearances    | n_links     | of each link to the walls / link length                      | -1  | 1   |
+    | part          | number      | meaning                                                              | min | max |
+    |---------------|-------------|----------------------------------------------------------------------|-----|-----|
+    | feed          | 1           | length of arm past the base / reach                                  | 0   | 1   |
+    | joint_angles  | n_links     | relative to the previous link / joint limit (or pi)                  | -1  | 1   |
+    | target_errors | 1 + n_links | target minus feed and joint angles / largest change in a step        | -1  | 1   |
+    | speeds        | 1 + n_links | of feed and joint angles / largest change in a step                  | -1  | 1   |
+    | tip_position  | 2           | x and y from the base / reach                                        | -1  | 1   |
+    | tip_heading   | 2           | cosine and sine                                                      | -1  | 1   |
+    | clearances    | n_links     | of each link to the walls / link length                              | -1  | 1   |
+    | goal_offset   | 2           | x and y from the tip to the goal / reach                             | -1  | 1   |
+    | goal_distance | 1           | from the tip round the walls / the same from the base, halved        | 0   | 1   |
+    | ahead         | 6           | places 0.5, 1 and 2 link lengths ahead on the shortest way to the goal, forward and left of the tip, each / that length | -1  | 1   |
+    | tip_rays      | 8           | with `rays`: to the walls, from -105 to 105 degrees off the last link / 2 link lengths | 0   | 1   |
+    | side_rays     | 2 * n_links | with `rays`: to the right and the left of each joint / 2 link lengths; 1 in the feeder | 0   | 1   |
+
+    `observation="goal"`: a dictionary for hindsight replay. `observation` is the vector without goal_offset,
+    goal_distance and ahead, `achieved_goal` is tip_position and `desired_goal` the goal's place, scaled alike.
+
+    `observation="image"`: the picture of `render`, `Box(0, 255, (image_size, image_size, 3), uint8)`.
 
     ## Rewards
 
-    The sum of three terms, which `info` holds one by one: `reward_progress`, by how much the way from the tip
-    to the goal round the walls has become shorter, in link lengths; `reward_collision`, -1 in a step in which
-    a link has gone into a wall or another link; `reward_goal`, 10 on success.
+    The sum of three terms, which `info` holds one by one.
+
+    | term            | `reward_type="dense"`                                                      | `reward_type="sparse"` |
+    |-----------------|----------------------------------------------------------------------------|------------------------|
+    | reward_progress | by how much the way from the tip to the goal round the walls has become shorter, in link lengths, from -0.1 to 0.1 | 0 |
+    | reward_contact  | -0.2 (`contact_penalty`) in a step in which a link went deeper into a wall or another link than the pinch tolerance | the same |
+    | reward_goal     | 10 on success                                                              | 1 on success           |
+
+    With `observation="goal"` the reward must be a function of the two goals, `compute_reward`: there
+    reward_progress is minus the straight distance from the tip to the goal / reach (0 if sparse), and
+    reward_goal is 1 in every step with the tip at the goal.
 
     ## Starting State
 
-    The whole arm is in the feeder, at rest, with its tip at the base. `reset(options={"feed": ...,
-    "joint_angles": ...})` starts elsewhere.
+    The whole arm is in the feeder, at rest, with its tip at the base. `reset(options=...)` starts elsewhere:
+
+    | option         | meaning                                                                                    |
+    |----------------|--------------------------------------------------------------------------------------------|
+    | `maze`         | another maze for the same arm: a Maze, a name or a file                                    |
+    | `task_id`      | with `maze="random"`: which of the mazes of the split                                      |
+    | `goal`         | another goal (x, y), in maze units                                                         |
+    | `feed`         | length of arm past the base, in maze units                                                 |
+    | `joint_angles` | in rad, with `feed`                                                                        |
+    | `motion`       | anything with `feed` (n_poses,) and `joint_angles` (n_poses, n_links): start at a pose of it |
+    | `waypoint`     | which pose; by default the first                                                           |
+    | `state`        | from `get_state` or `snapshot`                                                             |
 
     ## Episode End
 
-    Termination: the tip is within the goal's radius (success); or a link has gone into something deeper than
-    the pinch tolerance (unless `terminate_on_collision=False`); or the arm is jammed, with a link's end 0.05
-    link lengths from where it belongs or joined links 0.01 apart.
+    Termination: the tip has been within the goal's radius for `success_hold_steps` steps (success); or a link
+    has gone into something deeper than the pinch tolerance (unless `terminate_on_collision=False`); or the arm
+    is jammed, with a link's end 0.1 link lengths from where it belongs or joined links 0.02 apart.
 
-    Truncation: after 10,000 steps, by the time limit of the registration.
+    Truncation: by the time limit of the registration, 10,000 steps for `HyperRedundantMaze-v0`.
+
+    ## Info
+
+    The same keys from the reset on. Lengths are in maze units.
+
+    | key                                  | meaning                                                                |
+    |--------------------------------------|------------------------------------------------------------------------|
+    | success, is_success                  | whether the episode has ended in success                               |
+    | progress                             | share of the way to the goal that is done                              |
+    | feed, tip_distance, goal_distance    | length of arm past the base; tip to goal, straight and round the walls |
+    | clearance                            | smallest of all links, negative in a wall                              |
+    | pinches, collisions                  | links that did so in this step                                         |
+    | depth, impulse                       | largest in this step; impulse in link mass x link length / s           |
+    | joint_torques                        | mean of the step, shape (n_links,), in link mass x link length^2 / s^2 |
+    | node_error, drift                    | how far a link's end is from its place, and joined links apart         |
+    | task_id                              | which random maze, or -1                                               |
+    | reward_progress, reward_contact, reward_goal | the terms of the reward                                        |
+    | total_steps, total_reward, total_pinches, total_collisions | sums since the reset                             |
+    | worst_depth, worst_impulse           | largest since the reset                                                |
 
     ## Arguments
 
@@ -153,13 +208,37 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
     Parameters
     ----------
     maze : Maze, str or path
-        A maze, the name of one, or a maze file.
+        A maze, the name of one, or a maze file; "random" for a new one at every reset.
     link_length : float, optional
-        In maze units. By default one and a half times the mean width of the maze.
+        In maze units. By default one and a half times the mean width of the maze; 100 for random mazes.
     n_links : int, optional
-        By default enough to reach the goal.
+        By default enough to reach the goal; 12 for random mazes.
     link_radius : float
         In maze units; 0 means that links are line segments, as in the paper.
+    joint_limit : float, optional
+        Largest joint angle in rad; None means no limit.
+    observation : {"state", "goal", "image"}
+        What is observed.
+    rays : bool
+        Whether rays from the tip and to the sides of the joints are observed.
+    image_size : int
+        Side of an observed picture, in pixels.
+    action : {"delta", "absolute"}
+        What an action means.
+    reward_type : {"dense", "sparse"}
+        What is rewarded.
+    contact_penalty : float
+        For a step with a collision.
+    goal_radius : float, optional
+        In maze units; by default the maze's.
+    success_hold_steps : int
+        So many steps in a row the tip must be at the goal.
+    terminate_on_collision : bool
+        Whether a collision ends the episode.
+    split : {"train", "test"}
+        Which random mazes; no maze is in both.
+    difficulty : tuple of two floats
+        Range of the random mazes' difficulty, within [0, 1].
     substeps : int
         Simulated steps in one step of the environment.
     torque_limit : float, optional
@@ -168,9 +247,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         "gear": a servo in each joint turns its link to the target, and nothing else pushes the links. Walls
         then hardly push back: a link sinks into a wall by about 90 % of what it is sent. Use it to see what
         joint servos alone do; `torque_limit` must be None.
-    terminate_on_collision : bool
-        Whether a collision ends the episode.
-    render_mode : {None, "rgb_array"}
+    render_mode : {None, "human", "rgb_array"}
         "rgb_array" needs no display.
 
     Raises
@@ -222,10 +299,14 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             raise InputError(f"Expected a positive, finite goal_radius, or None, got {goal_radius!r}.")
         self._random: dict[str, Any] | None = None
         if isinstance(maze, str) and maze == "random":
-            link_length = RANDOM_LINK_LENGTH if link_length is None else link_length
-            n_links = RANDOM_N_LINKS if n_links is None else n_links
+            link_length = LINK_LENGTH if link_length is None else link_length
+            n_links = N_LINKS if n_links is None else n_links
             low, high = difficulty
-            self._random = {"difficulty": (float(low), float(high)), "link_length": link_length, "n_links": n_links}
+            self._random = {
+                "difficulty": (float(low), float(high)),
+                "link_length": link_length,
+                "n_links": n_links,
+            }
             maze = task_maze(split, 0, **self._random)
         self._split, self._goal_radius = split, goal_radius
         self._physics_options = {
@@ -249,7 +330,12 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         self.action_space = spaces.Box(-1.0, 1.0, (n_links + 1,), np.float32)
         self.observation_space = observation_space(observation, n_links, rays=rays, image_size=image_size)
         self._mode, self._rays, self._image_size = observation, rays, image_size
-        self._absolute, self._reward_type, self._contact_penalty = action == "absolute", reward_type, contact_penalty
+        self.action_mode = action
+        self._absolute, self._reward_type, self._contact_penalty = (
+            action == "absolute",
+            reward_type,
+            contact_penalty,
+        )
         self._success_hold_steps = success_hold_steps
         self._terminate_on_collision = terminate_on_collision
         self._joint_limit = math.pi if joint_limit is None else joint_limit
@@ -259,10 +345,9 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         )
         self._ahead = np.array(AHEAD) * link_length
         self._target, self._wanted = np.zeros(1 + n_links), np.zeros(1 + n_links)
-        self._no_rays = np.zeros(0)
+        self._no_rays, self._no_ahead = np.zeros(0), np.zeros((len(AHEAD), 2))
         self._picture: MazePicture | None = None
         self._scenes: OrderedDict[tuple[Maze, tuple[float, ...]], _Scene] = OrderedDict()
-        self._first = maze if self._random is None else None
         self._task_id = NO_TASK if self._random is None else 0
         self._first_maze = first
         self._enter(first, distance)
@@ -347,6 +432,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             collided={contact.link for contact in touching if contact.kind == "collision"},
         )
         return self._picture.rgb()
+
     def observe(self) -> Any:
         """Return the present observation, as the last `reset` or `step` has."""
         if self._mode == "image":
@@ -473,7 +559,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             raise InputError("Expected maze='random' for the reset option 'task_id', got another maze.")
         maze, self._task_id = wanted.maze_given(), NO_TASK
         if maze is None and self._random is not None:
-            n_tasks = N_TASKS[self._split]
+            n_tasks = N_TRAIN_TASKS if self._split == "train" else N_TEST_TASKS
             task_id = int(self.np_random.integers(n_tasks)) if wanted.task_id is None else wanted.task_id
             self._task_id, maze = task_id, task_maze(self._split, task_id, **self._random)
         if maze is None:
@@ -498,6 +584,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
                 self._scenes.popitem(last=False)
         self._scenes.move_to_end(maze)
         self._scene = scene
+        self._goal = (float(maze.goal[0]), float(maze.goal[1]))
 
     def _start(self, feed: float, joint_angles: FloatArray) -> None:
         physics = self.physics
@@ -571,7 +658,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         )
 
     def _tip_distance(self) -> float:
-        readings, goal = self.physics.sense().readings, self._goal
+        readings, goal = self.physics.sense().readings.tolist(), self._goal
         return math.hypot(readings[1] - goal[0], readings[2] - goal[1])
 
     def _distance_now(self) -> float:
@@ -613,3 +700,19 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
 def _mean_width(maze: Maze) -> float:
     """Return the width of the corridor that has the maze's area and length of walls."""
     return float(2.0 * maze.free_space.area / maze.free_space.length)
+
+
+def _check_one_of(what: str, value: Any, available: tuple[Any, ...]) -> None:
+    if value not in available:
+        raise InputError(f"Unknown {what} {value!r}. Available: {', '.join(map(repr, available))}.")
+
+
+def _check_at_least(what: str, value: Any, least: float, *, whole: bool = False) -> None:
+    right = isinstance(value, int | np.integer) if whole else _is_number(value)
+    if isinstance(value, bool) or not right or not (least <= value < math.inf):
+        kind = "a whole number" if whole else "a finite number"
+        raise InputError(f"Expected {what} to be {kind} of at least {least:g}, got {value!r}.")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)

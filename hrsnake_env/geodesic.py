@@ -185,7 +185,9 @@ def _corners(rings: list[FloatArray]) -> tuple[NDArray[np.int32], FloatArray, Fl
         after = np.diff(ring, axis=0)
         after /= np.linalg.norm(after, axis=1)[:, None]
         before = np.roll(after, 1, axis=0)
-        convex = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] < 0.0  # the free space is on the left
+        convex = (
+            before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] < 0.0
+        )  # the free space is on the left
         outward = (before + after)[convex] @ np.array([[0.0, 1.0], [-1.0, 0.0]])
         outward /= np.linalg.norm(outward, axis=1)[:, None]
         corner.append(convex)

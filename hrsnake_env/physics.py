@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pymunk
@@ -358,6 +358,18 @@ class Physics:
         self._n_active = 0
 
     # Saving and restoring
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy is made from: pymunk's objects are built again."""
+        options = {name: getattr(self, name) for name in ("maze", "arm", "substeps", "kinematic")}
+        limit = None if math.isinf(self._torque_limit) else self._torque_limit / SIM_LINK**2
+        options |= {"torque_limit": limit, "actuation": self._actuation}
+        return {"options": options, "state": self.get_state()}
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        """Build the simulator of a copy, and go to where it stood."""
+        self.__init__(**saved["options"])  # type: ignore[misc]
+        self.set_state(saved["state"])
 
     def get_state(self) -> PhysicsState:
         """Return where the simulation stands; it goes on undisturbed."""

@@ -118,8 +118,7 @@ def has_thin_walls(pieces: Iterable[WallPiece], link_length: float) -> bool:
     """Whether walls are too thin for the thickest solid layer, over more than the stump of a corner."""
     stump = 2.0 * CORE_RADII[0] * link_length
     return any(
-        0.0 < piece.radius < 0.99 * CORE_RADII[0] * link_length
-        and math.dist(piece.start, piece.end) > stump
+        0.0 < piece.radius < 0.99 * CORE_RADII[0] * link_length and math.dist(piece.start, piece.end) > stump
         for piece in pieces
     )
 
