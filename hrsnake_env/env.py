@@ -23,7 +23,7 @@ from hrsnake_env.maze import Maze
 from hrsnake_env.observation import AHEAD, observation_space, write_observation
 from hrsnake_env.options import ResetOptions
 from hrsnake_env.physics import CONTROL_TIMESTEP, Physics, PhysicsState
-from hrsnake_env.random_mazes import LINK_LENGTH, N_LINKS, N_TEST_TASKS, N_TRAIN_TASKS, SPLITS, task_maze
+from hrsnake_env.random_mazes import LINK_LENGTH, N_LINKS, N_TASKS, task_maze
 from hrsnake_env.rendering import MazePicture
 
 __all__ = ["EnvState", "HyperRedundantMazeEnv"]
@@ -120,7 +120,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
 
     ## Observation Space
 
-    `observation="state"`: `Box(low, 1, (5 * n_links + 16,), float32)`; with `rays=True` 8 + 2 * n_links
+    `observation="state"`: `Box(low, 1, (4 * n_links + 16,), float32)`; with `rays=True` 8 + 2 * n_links
     numbers more. Everything is cut to its bounds. The reach is the length of the arm.
 
     | part          | number      | meaning                                                              | min | max |
@@ -291,7 +291,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         _check_one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
         _check_one_of("action", action, task.ACTIONS)
         _check_one_of("reward_type", reward_type, task.REWARDS)
-        _check_one_of("split", split, SPLITS)
+        _check_one_of("split", split, tuple(N_TASKS))
         _check_at_least("contact_penalty", contact_penalty, 0.0)
         _check_at_least("success_hold_steps", success_hold_steps, 1, whole=True)
         _check_at_least("image_size", image_size, 16, whole=True)
@@ -329,6 +329,8 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         self.render_mode = render_mode
         self.action_space = spaces.Box(-1.0, 1.0, (n_links + 1,), np.float32)
         self.observation_space = observation_space(observation, n_links, rays=rays, image_size=image_size)
+        if observation == "goal":
+            self.compute_reward = self.goal_reward  # its presence says that there is a goal
         self._mode, self._rays, self._image_size = observation, rays, image_size
         self.action_mode = action
         self._absolute, self._reward_type, self._contact_penalty = (
@@ -464,10 +466,10 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             "desired_goal": self._goal_place(self.maze.goal),
         }
 
-    def compute_reward(
+    def goal_reward(
         self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Any
     ) -> float | NDArray[np.float64]:
-        """Return the reward of the mode "goal", of one transition or of many.
+        """Return the reward of the mode "goal", of one transition or of many: `env.compute_reward` there.
 
         Parameters
         ----------
@@ -559,7 +561,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             raise InputError("Expected maze='random' for the reset option 'task_id', got another maze.")
         maze, self._task_id = wanted.maze_given(), NO_TASK
         if maze is None and self._random is not None:
-            n_tasks = N_TRAIN_TASKS if self._split == "train" else N_TEST_TASKS
+            n_tasks = N_TASKS[self._split]
             task_id = int(self.np_random.integers(n_tasks)) if wanted.task_id is None else wanted.task_id
             self._task_id, maze = task_id, task_maze(self._split, task_id, **self._random)
         if maze is None:
