@@ -19,7 +19,8 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.geodesic import GeodesicDistance
 from hrsnake_env.maze import Maze
 from hrsnake_env.physics import CONTROL_TIMESTEP, Physics
-from hrsnake_env.rendering import MazePicture
+from hrsnake_env.rendering import Frame, FrameRenderer
+from hrsnake_env.window import Window
 
 __all__ = ["HyperRedundantMazeEnv"]
 
@@ -102,8 +103,8 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         joint servos alone do; `torque_limit` must be None.
     terminate_on_collision : bool
         Whether a collision ends the episode.
-    render_mode : {None, "rgb_array"}
-        "rgb_array" needs no display.
+    render_mode : {None, "human", "rgb_array"}
+        "human" shows every step in a window (`pip install "hrsnake[play]"`); "rgb_array" needs no display.
 
     Raises
     ------
@@ -116,7 +117,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
-        "render_modes": ["rgb_array"],
+        "render_modes": ["human", "rgb_array"],
         "render_fps": round(1 / CONTROL_TIMESTEP),
     }
 
@@ -133,7 +134,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         render_mode: str | None = None,
     ) -> None:
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise InputError(f"Unknown render_mode {render_mode!r}. Available: None, 'rgb_array'.")
+            raise InputError(f"Unknown render_mode {render_mode!r}. Available: None, 'human', 'rgb_array'.")
         self.maze = maze if isinstance(maze, Maze) else Maze.load(maze)
         self._goal_distance = GeodesicDistance(self.maze)
         self._way = self._goal_distance(self.maze.base_pose[:2])
@@ -153,7 +154,8 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         self.observation_space = task.observation_space(n_links)
         self._terminate_on_collision = terminate_on_collision
         self._step_limits = np.array([task.FEED_STEP * link_length, *([task.JOINT_STEP] * n_links)])
-        self._picture: MazePicture | None = None
+        self._renderer: FrameRenderer | None = None
+        self._window: Window | None = None
         self._distance = self._way
         self._start(0.0, np.zeros(n_links))
 
@@ -169,6 +171,8 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         if unknown:
             raise InputError(f"Unknown reset option {unknown[0]!r}. Available: {', '.join(RESET_OPTIONS)}.")
         self._start(options.get("feed", 0.0), options.get("joint_angles", np.zeros(self.physics.n_links)))
+        if self.render_mode == "human":
+            self.render()
         outcome = task.StepOutcome(progress=0.0, collided=False, succeeded=False)
         return self._observation(), self._info(outcome, ())
 
@@ -190,24 +194,43 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         )
         info = self._info(outcome, contacts)
         reward = sum(task.reward_terms(outcome).values())
+        if self.render_mode == "human":
+            self.render()
         return self._observation(), reward, failed or outcome.succeeded, False, info
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """Return a picture of the arm in the maze, shape (height, width, 3); None without a render mode."""
+    def render(self) -> Frame | None:
+        """Draw the arm in the maze, its links coloured by clearance, and what touches.
+
+        Returns
+        -------
+        frame : uint8 array, shape (height, width, 3), or None
+            None in the mode "human", which shows the frame in a window, and without a render mode.
+        """
         if self.render_mode is None:
             gym.logger.warn(
                 'Calling render() without a render mode; pass render_mode="rgb_array" to gym.make.'
             )
             return None
-        if self._picture is None:
-            self._picture = MazePicture(self.maze)
-        touching = self.physics.pose_contacts
-        self._picture.draw_arm(
+        if self._renderer is None:
+            self._renderer = FrameRenderer(self.maze, link_radius=self.arm.link_radius)
+        frame = self._renderer.draw(
             self.physics.joints,
-            pinched={contact.link for contact in touching if contact.kind == "pinch"},
-            collided={contact.link for contact in touching if contact.kind == "collision"},
+            clearances=self.physics.clearance,
+            link_length=self.arm.link_length,
+            contacts=self.physics.pose_contacts,
         )
-        return self._picture.rgb()
+        if self.render_mode == "rgb_array":
+            return frame
+        if self._window is None:
+            self._window = Window(self._renderer.size, fps=self.metadata["render_fps"], title=self.maze.name)
+        self._window.show(frame)
+        return None
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None
 
     def pinch_report(self) -> PinchReport:
         """Return whether links have merely pinched the walls since the reset, and where they collided."""

@@ -15,7 +15,7 @@ import hrsnake_env
 from hrsnake_env import ArmSpec, InputError, Maze
 from hrsnake_env.arm import feeder_angle_limits
 from hrsnake_env.env import HyperRedundantMazeEnv
-from hrsnake_env.rendering import MazePicture
+from hrsnake_env.pictures import MazePicture
 from hrsnake_env.task import (
     COLLISION_PENALTY,
     FEED_STEP,
@@ -292,7 +292,7 @@ def test_a_bad_action_is_named(action, message):
             {"actuation": "gear", "torque_limit": 0.5},
             "Expected no torque_limit with actuation 'gear', got 0.5.",
         ),
-        ({"render_mode": "ansi"}, "Unknown render_mode 'ansi'. Available: None, 'rgb_array'."),
+        ({"render_mode": "ansi"}, "Unknown render_mode 'ansi'. Available: None, 'human', 'rgb_array'."),
     ],
 )
 def test_a_bad_argument_is_named(arguments, message):
