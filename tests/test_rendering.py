@@ -212,12 +212,12 @@ def test_a_wrapper_collects_a_frame_for_the_reset_and_each_step():
 def test_an_episode_becomes_a_video(tmp_path):
     pytest.importorskip("moviepy")
     env = gym.make(ID, maze="fig19", link_length=430.0, render_mode="rgb_array")
-    env = gym.wrappers.RecordVideo(env, str(tmp_path), episode_trigger=lambda episode: True)
+    env = gym.wrappers.RecordVideo(env, str(tmp_path / "videos"), episode_trigger=lambda episode: True)
     env.reset()
     for _ in range(5):
         env.step(np.ones(env.action_space.shape))
     env.close()
-    assert [path.suffix for path in tmp_path.iterdir()] == [".mp4"]
+    assert [path.suffix for path in (tmp_path / "videos").iterdir()] == [".mp4"]
 
 
 def test_a_renderer_and_a_window_go_to_another_process_and_draw_the_same():
