@@ -6,7 +6,7 @@ import dataclasses
 import math
 import os
 from collections import OrderedDict
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import gymnasium as gym
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hrsnake_env import task
 from hrsnake_env.arm import ArmSpec, FloatArray
-from hrsnake_env.contacts import Contact, PinchReport
+from hrsnake_env.contacts import PinchReport
 from hrsnake_env.errors import InputError
 from hrsnake_env.geodesic import GeodesicDistance
 from hrsnake_env.maze import Maze
@@ -24,7 +24,9 @@ from hrsnake_env.observation import AHEAD, observation_space, write_observation
 from hrsnake_env.options import ResetOptions
 from hrsnake_env.physics import CONTROL_TIMESTEP, Physics, PhysicsState
 from hrsnake_env.random_mazes import LINK_LENGTH, N_LINKS, N_TASKS, task_maze
-from hrsnake_env.rendering import MazePicture
+from hrsnake_env.rendering import HEIGHT, Frame
+from hrsnake_env.tally import Tally
+from hrsnake_env.view import View
 
 __all__ = ["EnvState", "HyperRedundantMazeEnv"]
 
@@ -32,44 +34,6 @@ N_SCENES = 8
 """So many mazes are kept ready, with their walls and distances."""
 
 NO_TASK = -1
-
-
-@dataclass(slots=True)
-class _Tally:
-    """Count what has happened in the last step, and since the reset."""
-
-    distance: float
-    at_goal: int = 0
-    succeeded: bool = False
-    collided: bool = False
-    pinches: int = 0
-    collisions: int = 0
-    depth: float = 0.0
-    impulse: float = 0.0
-    terms: dict[str, float] = field(
-        default_factory=lambda: {"reward_progress": 0.0, "reward_contact": 0.0, "reward_goal": 0.0}
-    )
-    steps: int = 0
-    total_reward: float = 0.0
-    total_pinches: int = 0
-    total_collisions: int = 0
-    worst_depth: float = 0.0
-    worst_impulse: float = 0.0
-
-    def see(self, contacts: tuple[Contact, ...]) -> None:
-        """Take over the contacts of a step."""
-        self.pinches = self.collisions = 0
-        self.depth = self.impulse = 0.0
-        if contacts:
-            self.pinches = len({contact.link for contact in contacts if contact.kind == "pinch"})
-            self.collisions = len({contact.link for contact in contacts if contact.kind == "collision"})
-            self.depth = max(0.0, *(-contact.clearance for contact in contacts), 0.0)
-            self.impulse = max(contact.impulse for contact in contacts)
-        self.collided = self.collisions > 0
-        self.total_pinches += self.pinches
-        self.total_collisions += self.collisions
-        self.worst_depth = max(self.worst_depth, self.depth)
-        self.worst_impulse = max(self.worst_impulse, self.impulse)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -80,7 +44,7 @@ class EnvState:
     task_id: int
     target: FloatArray
     physics: PhysicsState
-    tally: Any
+    tally: Tally
     rng: dict[str, Any]
 
 
@@ -248,7 +212,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         then hardly push back: a link sinks into a wall by about 90 % of what it is sent. Use it to see what
         joint servos alone do; `torque_limit` must be None.
     render_mode : {None, "human", "rgb_array"}
-        "rgb_array" needs no display.
+        "human" shows every step in a window (`pip install "hrsnake[play]"`); "rgb_array" needs no display.
 
     Raises
     ------
@@ -261,7 +225,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
-        "render_modes": ["rgb_array"],
+        "render_modes": ["human", "rgb_array"],
         "render_fps": round(1 / CONTROL_TIMESTEP),
     }
 
@@ -348,8 +312,10 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         self._ahead = np.array(AHEAD) * link_length
         self._target, self._wanted = np.zeros(1 + n_links), np.zeros(1 + n_links)
         self._no_rays, self._no_ahead = np.zeros(0), np.zeros((len(AHEAD), 2))
-        self._picture: MazePicture | None = None
-        self._scenes: OrderedDict[tuple[Maze, tuple[float, ...]], _Scene] = OrderedDict()
+        size = (HEIGHT, HEIGHT) if self._random else None
+        self._view = View(size, fps=self.metadata["render_fps"])
+        self._eye = View((image_size, image_size), fps=self.metadata["render_fps"])
+        self._scenes: OrderedDict[Maze, _Scene] = OrderedDict()
         self._task_id = NO_TASK if self._random is None else 0
         self._first_maze = first
         self._enter(first, distance)
@@ -418,27 +384,32 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             self.render()
         return self.observe(), reward, terminated, False, self._info()
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """Return a picture of the arm in the maze, shape (height, width, 3); None without a render mode."""
+    def render(self) -> Frame | None:
+        """Draw the arm in the maze, its links coloured by clearance, and what touches.
+
+        Returns
+        -------
+        frame : uint8 array, shape (height, width, 3), or None
+            None in the mode "human", which shows the frame in a window, and without a render mode.
+        """
         if self.render_mode is None:
             gym.logger.warn(
                 'Calling render() without a render mode; pass render_mode="rgb_array" to gym.make.'
             )
             return None
-        if self._picture is None:
-            self._picture = MazePicture(self.maze)
-        touching = self.physics.pose_contacts
-        self._picture.draw_arm(
-            self.physics.joints,
-            pinched={contact.link for contact in touching if contact.kind == "pinch"},
-            collided={contact.link for contact in touching if contact.kind == "collision"},
-        )
-        return self._picture.rgb()
+        if self.render_mode == "rgb_array":
+            return self._view.frame(self.physics)
+        self._view.show(self.physics)
+        return None
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._view.close()
 
     def observe(self) -> Any:
         """Return the present observation, as the last `reset` or `step` has."""
         if self._mode == "image":
-            return self._image()
+            return self._eye.frame(self.physics)
         physics, goal = self.physics, self._mode == "state"
         senses = physics.sense()
         shape = self.observation_space if goal else self.observation_space["observation"]  # type: ignore[index]
@@ -534,7 +505,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             task_id=self._task_id,
             target=self._target.copy(),
             physics=physics,
-            tally=dataclasses.replace(self._tally, terms=dict(self._tally.terms)),
+            tally=self._tally.copy(),
             rng=self.np_random.bit_generator.state,  # type: ignore[arg-type]
         )
 
@@ -545,7 +516,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         self.physics.set_state(state.physics)
         self._task_id = state.task_id
         self._target = state.target.copy()
-        self._tally = dataclasses.replace(state.tally, terms=dict(state.tally.terms))
+        self._tally = state.tally.copy()
 
     # What it is made of
 
@@ -592,7 +563,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         physics = self.physics
         physics.reset(feed, joint_angles)
         self._target[:] = physics.target
-        self._tally = _Tally(distance=self._scene.way)
+        self._tally = Tally(distance=self._scene.way)
         self._tally.distance = self._distance_now()
         if feed > 0.0:
             self._check_start()
@@ -623,24 +594,21 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         )
         failed = jammed or (tally.collided and self._terminate_on_collision)
         at_goal = not failed and self._tip_distance() <= self.maze.goal_radius
-        tally.at_goal = tally.at_goal + 1 if at_goal else 0
-        tally.succeeded = tally.at_goal >= self._success_hold_steps
+        tally.steps_at_goal = tally.steps_at_goal + 1 if at_goal else 0
+        tally.succeeded = tally.steps_at_goal >= self._success_hold_steps
         if self._mode == "goal":
             place, goal = self._goal_place(physics.sense().readings[1:3]), self._goal_place(self.maze.goal)
             terms = self._goal_terms(place, goal, {"collisions": tally.collisions})
-            tally.terms = {name: float(value) for name, value in terms.items()}
+            terms = {name: float(value) for name, value in terms.items()}
         else:
-            tally.terms = task.reward_terms(
+            terms = task.reward_terms(
                 self._reward_type,
                 progress=(before - tally.distance) / length,
                 collided=tally.collided,
                 succeeded=tally.succeeded,
                 contact_penalty=self._contact_penalty,
             )
-        reward = sum(tally.terms.values())
-        tally.steps += 1
-        tally.total_reward += reward
-        return failed or tally.succeeded, reward
+        return failed or tally.succeeded, tally.reward(terms)
 
     def _goal_place(self, point: FloatArray) -> NDArray[np.float32]:
         """Return a place relative to the base, as a share of the arm's length."""

@@ -115,7 +115,9 @@ def _papers(maze: str, n_links: int, longest_rod: float, role: str) -> Rung:
 RUNGS = (
     _short("straight", 130.0, 3, "A smoke test: feed, and arrive."),
     _short("bend", 170.0, 4, "One loose bend: the first task in which joints must turn."),
-    _short("bend", 340.0, 5, "One bend of medium tightness; a link that follows the centreline still passes."),
+    _short(
+        "bend", 340.0, 5, "One bend of medium tightness; a link that follows the centreline still passes."
+    ),
     _short("u-turn", 132.0, 5, "A loose U-turn, learnt from scratch in seconds."),
     _short("u-turn", 220.0, 5, "The first rung that keeps learners from scratch at half the way."),
     _short("u-turn", 264.0, 5, "A U-turn just before links can no longer follow the centreline."),
@@ -124,7 +126,9 @@ RUNGS = (
     _short("u-turn", 430.0, 5, "The paper's U-turn and link, with short legs: links pinch the walls."),
     _short("s-bend", 170.0, 6, "Two loose bends to opposite sides."),
     _short("s-bend", 340.0, 6, "Two bends, in which neighbouring links turn to opposite sides."),
-    _short("s-bend", 420.0, 5, "Nearly the longest link with a known motion: bends this close cost a quarter."),
+    _short(
+        "s-bend", 420.0, 5, "Nearly the longest link with a known motion: bends this close cost a quarter."
+    ),
     _short("zigzag", 132.0, 7, "Two loose U-turns to opposite sides."),
     _short("zigzag", 352.0, 8, "Two U-turns to opposite sides in which links cannot follow the centreline."),
     _papers("fig19", 6, 440.0, "The paper's benchmark."),

@@ -241,7 +241,9 @@ def _lengths(bends: list[Bend], sides: FloatArray, slack: FloatArray, with_hall:
     between = [BASE + ENTRY + slack[0]]
     for k in range(1, len(bends)):
         wall = bends[k].wall
-        between.append(_apart(bends[k - 1], bends[k], sides[k - 1] != sides[k]) + slack[k] if wall is None else wall)
+        between.append(
+            _apart(bends[k - 1], bends[k], sides[k - 1] != sides[k]) + slack[k] if wall is None else wall
+        )
     between.append(MOUTH if with_hall else EXIT + slack[-1] + BEHIND)
     before = [*(bend.setbacks[0] for bend in bends), 0.0]
     behind = [0.0, *(bend.setbacks[1] for bend in bends)]

@@ -16,7 +16,7 @@ from hrsnake_env import ArmSpec, InputError, Maze
 from hrsnake_env.arm import FEEDER_RELEASE, feeder_angle_limits
 from hrsnake_env.env import HyperRedundantMazeEnv
 from hrsnake_env.observation import observation_names, observation_parts
-from hrsnake_env.rendering import MazePicture
+from hrsnake_env.pictures import MazePicture
 from hrsnake_env.options import RESET_OPTIONS
 from hrsnake_env.physics import RAY_REACH
 from hrsnake_env.task import (
@@ -319,18 +319,24 @@ def test_a_bad_action_is_named(action, message):
             {"actuation": "gear", "torque_limit": 0.5},
             "Expected no torque_limit with actuation 'gear', got 0.5.",
         ),
-        ({"render_mode": "ansi"}, "Unknown render_mode 'ansi'. Available: None, "),
+        ({"render_mode": "ansi"}, "Unknown render_mode 'ansi'. Available: None, 'human', 'rgb_array'."),
         ({"observation": "x"}, "Unknown observation 'x'. Available: 'state', 'goal', 'image'."),
         ({"observation": "image", "rays": True}, "Expected rays=False with observation 'image', got True."),
         ({"action": "x"}, "Unknown action 'x'. Available: 'delta', 'absolute'."),
         ({"reward_type": "x"}, "Unknown reward_type 'x'. Available: 'dense', 'sparse'."),
         ({"split": "x"}, "Unknown split 'x'. Available: 'train', 'test'."),
-        ({"contact_penalty": -0.1}, "Expected contact_penalty to be a finite number of at least 0, got -0.1."),
+        (
+            {"contact_penalty": -0.1},
+            "Expected contact_penalty to be a finite number of at least 0, got -0.1.",
+        ),
         ({"success_hold_steps": 0}, "Expected success_hold_steps to be a whole number of at least 1, got 0."),
         ({"image_size": 8}, "Expected image_size to be a whole number of at least 16, got 8."),
         ({"goal_radius": 0.0}, "Expected a positive, finite goal_radius, or None, got 0.0."),
         ({"joint_limit": 4.0}, "Expected joint_limit in (0, pi] rad, or None, got 4.0."),
-        ({"maze": "random", "difficulty": (0.5, 2.0)}, "Expected a range of difficulties in [0, 1], got (0.5, 2.0)."),
+        (
+            {"maze": "random", "difficulty": (0.5, 2.0)},
+            "Expected a range of difficulties in [0, 1], got (0.5, 2.0).",
+        ),
     ],
 )
 def test_a_bad_argument_is_named(arguments, message):

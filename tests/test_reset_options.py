@@ -32,7 +32,9 @@ def test_an_episode_starts_where_it_was_asked_to():
 
 
 def test_an_episode_starts_at_a_waypoint_of_anything_with_feed_and_joint_angles():
-    motion = SimpleNamespace(feed=np.array([0.0, 500.0, 1000.0]), joint_angles=np.array([0 * BENT, 0 * BENT, BENT]))
+    motion = SimpleNamespace(
+        feed=np.array([0.0, 500.0, 1000.0]), joint_angles=np.array([0 * BENT, 0 * BENT, BENT])
+    )
     env = make()
     for waypoint in range(3):
         _, info = env.reset(options={"motion": motion, "waypoint": waypoint})
@@ -97,7 +99,10 @@ def test_a_task_is_the_same_maze_every_time_and_drawn_ones_follow_the_seed():
         assert info["task_id"] == 17
         mazes.append(env.maze.free_space)
     assert mazes[0].equals_exact(mazes[1], 0.0)
-    drawn = [[env.reset(seed=seed)[1]["task_id"], *(env.reset()[1]["task_id"] for _ in range(3))] for seed in (1, 1, 2)]
+    drawn = [
+        [env.reset(seed=seed)[1]["task_id"], *(env.reset()[1]["task_id"] for _ in range(3))]
+        for seed in (1, 1, 2)
+    ]
     assert drawn[0] == drawn[1] != drawn[2]
     _, info = env.reset(options={"maze": Maze.load("L")})
     assert info["task_id"] == -1

@@ -18,7 +18,9 @@ WAYS = ["get_state", "snapshot", "pickled state", "pickled env", "deep copy", "r
 
 def make(maze="fig19", **arguments):
     length = PAPER_LINK_LENGTHS.get(maze, 300.0)
-    return gym.make(ID, maze=maze, **{"link_length": length, "terminate_on_collision": False, **arguments}).unwrapped
+    return gym.make(
+        ID, maze=maze, **{"link_length": length, "terminate_on_collision": False, **arguments}
+    ).unwrapped
 
 
 def actions_for(env, n, seed=0):
@@ -146,7 +148,11 @@ def test_whole_episodes_are_bit_identical_in_other_processes():
     )
     runs = {
         subprocess.run(
-            [sys.executable, "-c", code], check=True, capture_output=True, text=True, env={"PYTHONHASHSEED": seed}
+            [sys.executable, "-c", code],
+            check=True,
+            capture_output=True,
+            text=True,
+            env={"PYTHONHASHSEED": seed},
         ).stdout
         for seed in ("0", "1")
     }
