@@ -30,15 +30,12 @@ OFF_WALL = 1e-7
 MARGIN = 1e-6
 """In cells. A wall is listed in all cells that it comes this near to."""
 
-NEAR = 3
-"""In cells. Round a corner nodes are tried this far; farther ones only next to one whose way it is."""
-
 
 class Ways(NamedTuple):
     """Hold the shortest ways to the goal as plain arrays, for kernels.
 
     A shortest way runs straight from bend to bend, and bends at the walls' convex corners alone. Lengths and
-    places are in grid cells, from the grid's origin: node (i, j) is at (i, j), cell (i, j) right above it.
+    places are in grid cells, from the grid's origin: cell (i, j) goes from (i, j) to (i + 1, j + 1).
     """
 
     origin_x: float
@@ -46,8 +43,9 @@ class Ways(NamedTuple):
     origin_y: float
     cell: float
     """Side of a cell, in maze units."""
-    first: NDArray[np.int32]
-    """The first bend of the way from each node, shape (n_x, n_y); -1 in walls."""
+    n_x: int
+    """Number of cells along each axis; cell (i, j) is number i * n_y + j."""
+    n_y: int
     bends: FloatArray
     """The goal, then the corners, shape (n_bends, 2)."""
     lengths: FloatArray
@@ -56,11 +54,14 @@ class Ways(NamedTuple):
     """The bend after each bend, shape (n_bends,)."""
     walls: FloatArray
     """Start and end of each wall, shape (n_walls, 4)."""
-    corner: NDArray[np.int32]
-    """The bend at the start of each wall, or -1, shape (n_walls,)."""
-    begins: NDArray[np.int32]
-    """Where the list of each cell's walls begins in `listed`, shape (n_x * n_y + 1,)."""
-    listed: NDArray[np.int32]
+    wall_begins: NDArray[np.int32]
+    """Where the walls of each cell begin in `cell_walls`, shape (n_cells + 1,)."""
+    cell_walls: NDArray[np.int32]
+    """The walls in each cell, cell by cell."""
+    bend_begins: NDArray[np.int32]
+    """Where the bends of each cell begin in `cell_bends`, shape (n_cells + 1,)."""
+    cell_bends: NDArray[np.int32]
+    """The bends with which a way from each cell can begin, cell by cell."""
 
 
 class GeodesicDistance:
@@ -134,53 +135,52 @@ def _frozen(ways: Ways) -> Ways:
 
 
 def _ways(maze: Maze, goal: FloatArray) -> Ways:
-    """Find the shortest ways from all corners and grid nodes."""
+    """Find the shortest ways from all corners, and the corners with which ways from each cell can begin."""
     mean_width = 2.0 * maze.free_space.area / maze.free_space.length
     cell = max(mean_width / CELLS_PER_WIDTH, maze.size / MAX_CELLS)
     low, high = np.reshape(maze.free_space.bounds, (2, 2))
     origin = low - 1.5 * cell
-    n_x, n_y = (np.ceil((high - origin) / cell) + 2).astype(int)
+    n_x, n_y = (int(n) for n in np.ceil((high - origin) / cell) + 2)
     rings = [(ring - origin) / cell for ring in maze.rings]
     walls = np.concatenate([np.hstack([ring[:-1], ring[1:]]) for ring in rings])
-    corner, places, ends = _corners(rings)
-    begins, listed = _listed(walls, n_x, n_y)
+    corners, ends = _corners(rings)
+    wall_begins, cell_walls = _by_cell(_walls_in_cells(walls, n_y), n_x * n_y)
     ways = Ways(
         origin_x=float(origin[0]),
         origin_y=float(origin[1]),
         cell=float(cell),
-        first=np.full((n_x, n_y), -1, dtype=np.int32),
-        bends=np.concatenate([((goal - origin) / cell)[None], places]),
-        lengths=np.full(1 + len(places), math.inf),
-        onward=np.zeros(1 + len(places), dtype=np.int32),
+        n_x=n_x,
+        n_y=n_y,
+        bends=np.concatenate([((goal - origin) / cell)[None], corners]),
+        lengths=np.zeros(len(ends)),
+        onward=np.zeros(len(ends), dtype=np.int32),
         walls=walls,
-        corner=corner,
-        begins=begins,
-        listed=listed,
+        wall_begins=wall_begins,
+        cell_walls=cell_walls,
+        bend_begins=np.zeros(n_x * n_y + 1, dtype=np.int32),
+        cell_bends=np.zeros(0, dtype=np.int32),
     )
     ways.bends[0] = _off_walls(ways, *ways.bends[0])
-    pairs = _bends_in_sight(ways, ends)
-    gaps = np.linalg.norm(ways.bends[pairs[:, 0]] - ways.bends[pairs[:, 1]], axis=1)
-    graph = csr_array((gaps, (pairs[:, 0], pairs[:, 1])), shape=(len(ends), len(ends)))
+    a, b = _bends_in_sight(ways, ends).T
+    gaps = np.linalg.norm(ways.bends[a] - ways.bends[b], axis=1)
+    graph = csr_array((gaps, (a, b)), shape=(len(ends), len(ends)))
     ways.lengths[:], onward = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
     ways.onward[:] = np.maximum(onward, 0)
-    reached = np.flatnonzero(np.isfinite(ways.lengths))
-    _spread(ways, reached[np.argsort(ways.lengths[reached])])
-    return ways
+    bend_begins, cell_bends = _by_cell(_bends_of_cells(ways, ends), n_x * n_y)
+    return ways._replace(bend_begins=bend_begins, cell_bends=cell_bends)
 
 
-def _corners(rings: list[FloatArray]) -> tuple[NDArray[np.int32], FloatArray, FloatArray]:
+def _corners(rings: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Find the walls' convex corners.
 
     Returns
     -------
-    corner : array, shape (n_walls,)
-        The bend at the start of each wall (the goal being bend 0), or -1.
-    places : array, shape (n_corners, 2)
+    corners : array, shape (n_corners, 2)
         The corners, a little off the wall.
     ends : array, shape (1 + n_corners, 4)
-        The directions in which the two walls of each bend leave it; zeros for the goal.
+        The directions in which the two walls of each bend leave it; zeros for the goal, which is bend 0.
     """
-    corner, places, ends = [], [], [np.zeros((1, 4))]
+    corners, ends = [], [np.zeros((1, 4))]
     for ring in rings:
         after = np.diff(ring, axis=0)
         after /= np.linalg.norm(after, axis=1)[:, None]
@@ -188,12 +188,16 @@ def _corners(rings: list[FloatArray]) -> tuple[NDArray[np.int32], FloatArray, Fl
         convex = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] < 0.0  # the free space is on the left
         outward = (before + after)[convex] @ np.array([[0.0, 1.0], [-1.0, 0.0]])
         outward /= np.linalg.norm(outward, axis=1)[:, None]
-        corner.append(convex)
-        places.append(ring[:-1][convex] + 2.0 * OFF_WALL * outward)
+        corners.append(ring[:-1][convex] + 2.0 * OFF_WALL * outward)
         ends.append(np.hstack([-before[convex], after[convex]]))
-    is_corner = np.concatenate(corner)
-    numbers = np.where(is_corner, np.cumsum(is_corner), -1).astype(np.int32)
-    return numbers, np.concatenate(places), np.concatenate(ends)
+    return np.concatenate(corners), np.concatenate(ends)
+
+
+def _by_cell(entries: FloatArray, n_cells: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Sort rows (cell, what is in it, rank) by cell and rank; return where each cell begins, and what is in it."""
+    entries = entries[np.lexsort((entries[:, 2], entries[:, 0]))]
+    begins = np.searchsorted(entries[:, 0], np.arange(n_cells + 1))
+    return begins.astype(np.int32), entries[:, 1].astype(np.int32)
 
 
 @numba.njit(cache=True)
@@ -227,8 +231,7 @@ def look_ahead(ways: Ways, x: float, y: float, distances: FloatArray, places: Fl
 @numba.njit(cache=True)
 def _way_from(ways: Ways, x: float, y: float) -> tuple[float, float, int, float]:
     """Return where the way from a place begins in the free space, its first bend, and its length."""
-    n_x, n_y = ways.first.shape
-    if not (0.0 <= x < n_x - 1 and 0.0 <= y < n_y - 1):
+    if not (0.0 <= x < ways.n_x and 0.0 <= y < ways.n_y):
         return x, y, -1, math.inf
     start_x, start_y = _off_walls(ways, x, y)
     bend, length = _first_bend(ways, start_x, start_y)
@@ -243,38 +246,20 @@ def _way_from(ways: Ways, x: float, y: float) -> tuple[float, float, int, float]
 @numba.njit(cache=True)
 def _first_bend(ways: Ways, x: float, y: float) -> tuple[int, float]:
     """Return the first bend of the shortest way from a place, and the way's length; -1 in a wall."""
-    i, j = int(x), int(y)
-    best, length = -1, math.inf
-    for di in range(2):
-        for dj in range(2):
-            best, length = _nearer(ways, x, y, ways.first[i + di, j + dj], best, length)
-    c = i * ways.first.shape[1] + j
-    for k in range(ways.begins[c], ways.begins[c + 1]):
-        best, length = _nearer(ways, x, y, ways.corner[ways.listed[k]], best, length)
-    if best < 0:  # in a gap between the nodes, or in a wall
-        for bend in range(len(ways.bends)):
-            best, length = _nearer(ways, x, y, bend, best, length)
-    tried = -1
-    while best > 0 and best != tried:  # a bend may be left out, as a taut string leaves it
-        tried = best
-        best, length = _nearer(ways, x, y, ways.onward[best], best, length)
-    return best, length
+    c = int(x) * ways.n_y + int(y)
+    best, least = -1, math.inf
+    for k in range(ways.bend_begins[c], ways.bend_begins[c + 1]):
+        bend = ways.cell_bends[k]
+        bend_x, bend_y = ways.bends[bend]
+        length = math.hypot(bend_x - x, bend_y - y) + ways.lengths[bend]
+        if length < least and _wall_between(ways, x, y, bend_x, bend_y) < 0:
+            best, least = bend, length
+    return best, least
 
 
 @numba.njit(cache=True)
-def _nearer(ways: Ways, x: float, y: float, bend: int, best: int, length: float) -> tuple[int, float]:
-    """Return the better of two first bends, the second of which is in sight, and the way's length."""
-    if bend < 0 or bend == best:
-        return best, length
-    other = ways.lengths[bend] + math.hypot(ways.bends[bend, 0] - x, ways.bends[bend, 1] - y)
-    if other < length and _sees(ways, x, y, ways.bends[bend, 0], ways.bends[bend, 1]):
-        return bend, other
-    return best, length
-
-
-@numba.njit(cache=True)
-def _sees(ways: Ways, ax: float, ay: float, bx: float, by: float) -> bool:
-    """Tell whether no wall touches the line from a to b, going through the cells on it."""
+def _wall_between(ways: Ways, ax: float, ay: float, bx: float, by: float) -> int:
+    """Return a wall that touches the line from a to b, the first to be found in the cells on it, or -1."""
     i, j, last_i, last_j = int(ax), int(ay), int(bx), int(by)
     dx, dy = bx - ax, by - ay
     step_i, step_j = 1 if dx > 0.0 else -1, 1 if dy > 0.0 else -1
@@ -282,14 +267,13 @@ def _sees(ways: Ways, ax: float, ay: float, bx: float, by: float) -> bool:
     # When, between 0 at a and 1 at b, the line comes to the next column and to the next row of cells.
     next_x = ((i + 1 - ax) if dx > 0.0 else (ax - i)) * pace_x if dx != 0.0 else math.inf
     next_y = ((j + 1 - ay) if dy > 0.0 else (ay - j)) * pace_y if dy != 0.0 else math.inf
-    n_y = ways.first.shape[1]
     while True:
-        c = i * n_y + j
-        for k in range(ways.begins[c], ways.begins[c + 1]):
-            if _crosses(ways.walls, ways.listed[k], ax, ay, bx, by):
-                return False
+        c = i * ways.n_y + j
+        for k in range(ways.wall_begins[c], ways.wall_begins[c + 1]):
+            if _crosses(ways.walls, ways.cell_walls[k], ax, ay, bx, by):
+                return ways.cell_walls[k]
         if i == last_i and j == last_j:
-            return True
+            return -1
         if j == last_j or (i != last_i and next_x < next_y):
             i += step_i
             next_x += pace_x
@@ -318,10 +302,10 @@ def _crosses(walls: FloatArray, k: int, ax: float, ay: float, bx: float, by: flo
 @numba.njit(cache=True)
 def _off_walls(ways: Ways, x: float, y: float) -> tuple[float, float]:
     """Return the place OFF_WALL in front of a wall, if (x, y) is nearer to one than that."""
-    c = int(x) * ways.first.shape[1] + int(y)
+    c = int(x) * ways.n_y + int(y)
     for _ in range(2):  # in a corner, off either wall
-        for k in range(ways.begins[c], ways.begins[c + 1]):
-            wall = ways.listed[k]
+        for k in range(ways.wall_begins[c], ways.wall_begins[c + 1]):
+            wall = ways.cell_walls[k]
             near_x, near_y = _nearest_on_wall(ways.walls, wall, x, y)
             if math.hypot(x - near_x, y - near_y) >= OFF_WALL:
                 continue
@@ -342,12 +326,12 @@ def _nearest_on_wall(walls: FloatArray, k: int, x: float, y: float) -> tuple[flo
 @numba.njit(cache=True)
 def _nearest_on_walls(ways: Ways, x: float, y: float) -> tuple[float, float]:
     """Return the nearest place on a wall; infinite if it is more than a cell away."""
-    n_x, n_y = ways.first.shape
+    n_x, n_y = ways.n_x, ways.n_y
     best_x, best_y, least = math.inf, math.inf, 1.0
     for i in range(max(int(x) - 1, 0), min(int(x) + 2, n_x)):
         for c in range(i * n_y + max(int(y) - 1, 0), i * n_y + min(int(y) + 2, n_y)):
-            for k in range(ways.begins[c], ways.begins[c + 1]):
-                near_x, near_y = _nearest_on_wall(ways.walls, ways.listed[k], x, y)
+            for k in range(ways.wall_begins[c], ways.wall_begins[c + 1]):
+                near_x, near_y = _nearest_on_wall(ways.walls, ways.cell_walls[k], x, y)
                 gap = math.hypot(near_x - x, near_y - y)
                 if gap < least:
                     best_x, best_y, least = near_x, near_y, gap
@@ -355,47 +339,35 @@ def _nearest_on_walls(ways: Ways, x: float, y: float) -> tuple[float, float]:
 
 
 @numba.njit(cache=True)
-def _listed(walls: FloatArray, n_x: int, n_y: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """List the walls of each cell; returns `Ways.begins` and `Ways.listed`."""
-    begins = np.zeros(n_x * n_y + 1, dtype=np.int32)
-    listed = np.empty(0, dtype=np.int32)
-    for fill in (False, True):
-        for wall in range(len(walls)):
-            px, py, qx, qy = walls[wall]
-            if px > qx:
-                px, py, qx, qy = qx, qy, px, py
-            for i in range(int(px - MARGIN), int(qx + MARGIN) + 1):
-                # The part of the wall in this column of cells.
-                a, b = 0.0, 1.0
-                if qx > px:
-                    a = min(max((i - MARGIN - px) / (qx - px), 0.0), 1.0)
-                    b = min(max((i + 1 + MARGIN - px) / (qx - px), 0.0), 1.0)
-                low = min(py + a * (qy - py), py + b * (qy - py)) - MARGIN
-                high = max(py + a * (qy - py), py + b * (qy - py)) + MARGIN
-                for j in range(int(low), int(high) + 1):
-                    c = i * n_y + j
-                    if fill:
-                        begins[c] -= 1
-                        listed[begins[c]] = wall
-                    else:
-                        begins[c] += 1
-        if not fill:
-            begins[:] = np.cumsum(begins)
-            listed = np.empty(begins[-1], dtype=np.int32)
-    return begins, listed
+def _walls_in_cells(walls: FloatArray, n_y: int) -> FloatArray:
+    """Return rows (cell, wall, 0): the cells that each wall comes within MARGIN of."""
+    rows = [(0.0, 0.0, 0.0) for _ in range(0)]
+    for wall in range(len(walls)):
+        px, py, qx, qy = walls[wall]
+        if px > qx:
+            px, py, qx, qy = qx, qy, px, py
+        for i in range(int(px - MARGIN), int(qx + MARGIN) + 1):
+            a, b = 0.0, 1.0  # the part of the wall in this column of cells
+            if qx > px:
+                a = min(max((i - MARGIN - px) / (qx - px), 0.0), 1.0)
+                b = min(max((i + 1 + MARGIN - px) / (qx - px), 0.0), 1.0)
+            end_a, end_b = py + a * (qy - py), py + b * (qy - py)
+            for j in range(int(min(end_a, end_b) - MARGIN), int(max(end_a, end_b) + MARGIN) + 1):
+                rows.append((float(i * n_y + j), float(wall), 0.0))
+    return np.array(rows)
 
 
 @numba.njit(cache=True)
 def _bends_in_sight(ways: Ways, ends: FloatArray) -> NDArray[np.int64]:
-    """Return the pairs of bends that see each other, and at both of which a taut string could bend."""
+    """Return the pairs of bends that see each other, and round both of which a taut string could bend."""
     pairs = [(0, 0) for _ in range(0)]
     for a in range(len(ends)):
+        ax, ay = ways.bends[a]
         for b in range(a):
-            dx, dy = ways.bends[b, 0] - ways.bends[a, 0], ways.bends[b, 1] - ways.bends[a, 1]
-            if not (_grazes(ends[a], dx, dy) and _grazes(ends[b], dx, dy)):
-                continue
-            if _sees(ways, ways.bends[a, 0], ways.bends[a, 1], ways.bends[b, 0], ways.bends[b, 1]):
-                pairs.append((a, b))
+            bx, by = ways.bends[b]
+            if _grazes(ends[a], bx - ax, by - ay) and _grazes(ends[b], bx - ax, by - ay):
+                if _wall_between(ways, ax, ay, bx, by) < 0:
+                    pairs.append((a, b))
     return np.array(pairs).reshape(-1, 2)
 
 
@@ -403,31 +375,67 @@ def _bends_in_sight(ways: Ways, ends: FloatArray) -> NDArray[np.int64]:
 def _grazes(ends: FloatArray, dx: float, dy: float) -> bool:
     """Tell whether a line passes by a corner with both of its walls on one side."""
     one, other = dx * ends[1] - dy * ends[0], dx * ends[3] - dy * ends[2]
-    tolerance = 1e-5
-    return not (min(one, other) < -tolerance and max(one, other) > tolerance)
+    return not (min(one, other) < -MARGIN and max(one, other) > MARGIN)
 
 
 @numba.njit(cache=True)
-def _spread(ways: Ways, order: NDArray[np.int64]) -> None:
-    """Find the first bend of the way from each node: spread from each bend in the order of their lengths."""
-    n_x, n_y = ways.first.shape
-    lengths = np.full((n_x, n_y), math.inf)
-    tried = np.full((n_x, n_y), -1, dtype=np.int32)
-    stack = np.empty((n_x * n_y, 2), dtype=np.int32)
-    for bend in order:
+def _bends_of_cells(ways: Ways, ends: FloatArray) -> FloatArray:
+    """Return rows (cell, bend, length of the way over it): from which cells a way can begin with which bend.
+
+    Ways that begin with a bend come from places that see it and lie in its shadow: between the line on which
+    the way goes on, drawn backwards, and the wall. The cells that such places are in hang together. A cell
+    too many does no harm.
+    """
+    rows = [(0.0, 0.0, 0.0) for _ in range(0)]
+    reached = np.full(ways.n_x * ways.n_y, -1, dtype=np.int32)
+    stack = np.empty(ways.n_x * ways.n_y, dtype=np.int32)
+    for bend in range(len(ends)):
+        if ways.lengths[bend] == math.inf:
+            continue
         x, y = ways.bends[bend]
-        n, reach, i, j = 0, NEAR, int(x), int(y)
-        while n >= 0:
-            for a in range(max(i - reach, 0), min(i + reach + 1, n_x)):
-                for b in range(max(j - reach, 0), min(j + reach + 1, n_y)):
-                    if tried[a, b] == bend:
-                        continue
-                    tried[a, b] = bend
-                    length = ways.lengths[bend] + math.hypot(x - a, y - b)
-                    if length < lengths[a, b] and _sees(ways, a, b, x, y):
-                        lengths[a, b], ways.first[a, b] = length, bend
-                        stack[n] = a, b
+        stack[0], n = int(x) * ways.n_y + int(y), 1
+        reached[stack[0]] = bend
+        while n > 0:
+            n -= 1
+            i, j = stack[n] // ways.n_y, stack[n] % ways.n_y
+            if not _in_shadow(ways, ends, bend, i, j) or _hidden(ways, x, y, i, j):
+                continue
+            length = ways.lengths[bend] + math.hypot(i + 0.5 - x, j + 0.5 - y)
+            rows.append((float(i * ways.n_y + j), float(bend), length))
+            for a in range(max(i - 1, 1), min(i + 2, ways.n_x - 1)):
+                for c in range(a * ways.n_y + max(j - 1, 1), a * ways.n_y + min(j + 2, ways.n_y - 1)):
+                    if reached[c] != bend:
+                        reached[c], stack[n] = bend, c
                         n += 1
-            n, reach = n - 1, 1
-            if n >= 0:
-                i, j = stack[n]
+    return np.array(rows)
+
+
+@numba.njit(cache=True)
+def _in_shadow(ways: Ways, ends: FloatArray, bend: int, i: int, j: int) -> bool:
+    """Tell whether ways from places in cell (i, j) can turn round a bend towards the next one."""
+    if bend == 0:
+        return True
+    x, y = ways.bends[bend]
+    on_x, on_y = ways.bends[ways.onward[bend], 0] - x, ways.bends[ways.onward[bend], 1] - y
+    gap = math.hypot(on_x, on_y)
+    on_x, on_y = on_x / gap, on_y / gap
+    side = on_x * (ends[bend, 1] + ends[bend, 3]) - on_y * (ends[bend, 0] + ends[bend, 2])
+    turn = 1.0 if side > 0.0 else -1.0  # counter-clockwise, if the walls are on the left
+    dx, dy = x - (i + 0.5), y - (j + 0.5)
+    for ux, uy in ((on_x, on_y), (ends[bend, 0], ends[bend, 1]), (ends[bend, 2], ends[bend, 3])):
+        if turn * (dx * uy - dy * ux) < -0.5 * (abs(ux) + abs(uy)) - MARGIN:
+            return False
+    return True
+
+
+@numba.njit(cache=True)
+def _hidden(ways: Ways, x: float, y: float, i: int, j: int) -> bool:
+    """Tell whether one wall hides all of cell (i, j) from (x, y)."""
+    low_x, high_x, low_y, high_y = i - MARGIN, i + 1 + MARGIN, j - MARGIN, j + 1 + MARGIN
+    wall = _wall_between(ways, x, y, low_x, low_y)
+    if wall < 0:
+        return False
+    for a, b in ((high_x, low_y), (low_x, high_y), (high_x, high_y)):
+        if not _crosses(ways.walls, wall, x, y, a, b):
+            return False
+    return True
