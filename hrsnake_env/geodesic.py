@@ -30,6 +30,9 @@ OFF_WALL = 1e-7
 MARGIN = 1e-6
 """In cells. A wall is listed in all cells that it comes this near to."""
 
+HALF_DIAGONAL = 0.71
+"""Of a cell, in cells, rounded up."""
+
 
 class Ways(NamedTuple):
     """Hold the shortest ways to the goal as plain arrays, for kernels.
@@ -368,7 +371,10 @@ def _bends_in_sight(ways: Ways, ends: FloatArray) -> NDArray[np.int64]:
             if _grazes(ends[a], bx - ax, by - ay) and _grazes(ends[b], bx - ax, by - ay):
                 if _wall_between(ways, ax, ay, bx, by) < 0:
                     pairs.append((a, b))
-    return np.array(pairs).reshape(-1, 2)
+    found = np.empty((len(pairs), 2), dtype=np.int64)
+    for k in range(len(pairs)):
+        found[k] = pairs[k]
+    return found
 
 
 @numba.njit(cache=True)
@@ -382,30 +388,37 @@ def _grazes(ends: FloatArray, dx: float, dy: float) -> bool:
 def _bends_of_cells(ways: Ways, ends: FloatArray) -> FloatArray:
     """Return rows (cell, bend, length of the way over it): from which cells a way can begin with which bend.
 
-    Ways that begin with a bend come from places that see it and lie in its shadow: between the line on which
-    the way goes on, drawn backwards, and the wall. The cells that such places are in hang together. A cell
-    too many does no harm.
+    Ways that begin with a bend come from places that see it, lie in its shadow (between the line on which the
+    way goes on, drawn backwards, and the wall), and have no shorter way. The cells that such places are in
+    hang together, so a flood from the bend finds them. A cell too many does no harm.
     """
     rows = [(0.0, 0.0, 0.0) for _ in range(0)]
-    reached = np.full(ways.n_x * ways.n_y, -1, dtype=np.int32)
-    stack = np.empty(ways.n_x * ways.n_y, dtype=np.int32)
-    for bend in range(len(ends)):
+    n_cells = ways.n_x * ways.n_y
+    known = np.full(n_cells, math.inf)  # from anywhere in the cell there is a way no longer than this
+    reached = np.full(n_cells, -1, dtype=np.int32)
+    stack = np.empty(n_cells, dtype=np.int32)
+    for bend in np.argsort(ways.lengths):
         if ways.lengths[bend] == math.inf:
-            continue
+            break
         x, y = ways.bends[bend]
         stack[0], n = int(x) * ways.n_y + int(y), 1
         reached[stack[0]] = bend
         while n > 0:
             n -= 1
-            i, j = stack[n] // ways.n_y, stack[n] % ways.n_y
-            if not _in_shadow(ways, ends, bend, i, j) or _hidden(ways, x, y, i, j):
-                continue
+            c, i, j = stack[n], stack[n] // ways.n_y, stack[n] % ways.n_y
             length = ways.lengths[bend] + math.hypot(i + 0.5 - x, j + 0.5 - y)
-            rows.append((float(i * ways.n_y + j), float(bend), length))
+            if length - HALF_DIAGONAL > known[c] or not _in_shadow(ways, ends, bend, i, j):
+                continue
+            wall = _wall_between(ways, x, y, i - MARGIN, j - MARGIN)
+            if wall >= 0 and _hides(ways.walls, wall, x, y, i, j):
+                continue
+            if wall < 0 and ways.wall_begins[c] == ways.wall_begins[c + 1]:
+                known[c] = min(known[c], length + 3.1 * HALF_DIAGONAL)  # by the corner of the cell that is seen
+            rows.append((float(c), float(bend), length))
             for a in range(max(i - 1, 1), min(i + 2, ways.n_x - 1)):
-                for c in range(a * ways.n_y + max(j - 1, 1), a * ways.n_y + min(j + 2, ways.n_y - 1)):
-                    if reached[c] != bend:
-                        reached[c], stack[n] = bend, c
+                for near in range(a * ways.n_y + max(j - 1, 1), a * ways.n_y + min(j + 2, ways.n_y - 1)):
+                    if reached[near] != bend:
+                        reached[near], stack[n] = bend, near
                         n += 1
     return np.array(rows)
 
@@ -429,13 +442,10 @@ def _in_shadow(ways: Ways, ends: FloatArray, bend: int, i: int, j: int) -> bool:
 
 
 @numba.njit(cache=True)
-def _hidden(ways: Ways, x: float, y: float, i: int, j: int) -> bool:
-    """Tell whether one wall hides all of cell (i, j) from (x, y)."""
-    low_x, high_x, low_y, high_y = i - MARGIN, i + 1 + MARGIN, j - MARGIN, j + 1 + MARGIN
-    wall = _wall_between(ways, x, y, low_x, low_y)
-    if wall < 0:
-        return False
-    for a, b in ((high_x, low_y), (low_x, high_y), (high_x, high_y)):
-        if not _crosses(ways.walls, wall, x, y, a, b):
-            return False
+def _hides(walls: FloatArray, wall: int, x: float, y: float, i: int, j: int) -> bool:
+    """Tell whether a wall hides all of cell (i, j) from (x, y): all four corners."""
+    for a in (i - MARGIN, i + 1 + MARGIN):
+        for b in (j - MARGIN, j + 1 + MARGIN):
+            if not _crosses(walls, wall, x, y, a, b):
+                return False
     return True
