@@ -30,6 +30,9 @@ OFF_WALL = 1e-7
 MARGIN = 1e-6
 """In cells. A wall is listed in all cells that it comes this near to."""
 
+INTO_WALLS = 0.25
+"""In cells. Less deep in a wall there still is a way: out of it first, then on from the surface."""
+
 HALF_DIAGONAL = 0.71
 """Of a cell, in cells, rounded up."""
 
@@ -100,7 +103,7 @@ class GeodesicDistance:
             )
 
     def __call__(self, point: ArrayLike) -> float:
-        """Return the distance from a point, shape (2,), in maze units; infinite far inside a wall."""
+        """Return the distance from a point, shape (2,), in maze units; infinite deep in a wall."""
         x, y = np.asarray(point, dtype=np.float64)
         return float(distance_at(self.ways, x, y))
 
@@ -117,7 +120,7 @@ class GeodesicDistance:
         Returns
         -------
         places : array, shape (n, 2)
-            In maze units: the goal where it is nearer, and the point itself far inside a wall.
+            In maze units: the goal where it is nearer, and the point itself deep in a wall.
 
         Raises
         ------
@@ -125,7 +128,7 @@ class GeodesicDistance:
             If a distance is negative or not a number.
         """
         x, y = np.asarray(point, dtype=np.float64)
-        along = np.ascontiguousarray(distances, dtype=np.float64)
+        along = np.array(distances, dtype=np.float64)
         if not (along.ndim == 1 and (along >= 0.0).all()):
             raise InputError(f"Expected a list of distances that are not negative, got {distances!r}.")
         places = np.empty((len(along), 2))
@@ -221,7 +224,7 @@ def _by_cell(entries: FloatArray, n_cells: int) -> tuple[NDArray[np.int32], NDAr
 
 @numba.njit(cache=True)
 def distance_at(ways: Ways, x: float, y: float) -> float:
-    """Return the distance from a place to the goal, in maze units; infinite far inside a wall."""
+    """Return the distance from a place to the goal, in maze units; infinite deep in a wall."""
     _, _, _, length = _way_from(ways, (x - ways.origin_x) / ways.cell, (y - ways.origin_y) / ways.cell)
     return length * ways.cell
 
@@ -290,7 +293,7 @@ def _wall_between(ways: Ways, ax: float, ay: float, bx: float, by: float) -> int
         c = i * ways.n_y + j
         for k in range(ways.wall_begins[c], ways.wall_begins[c + 1]):
             if _crosses(ways.walls, ways.cell_walls[k], ax, ay, bx, by):
-                return ways.cell_walls[k]
+                return int(ways.cell_walls[k])
         if i == last_i and j == last_j:
             return -1
         if j == last_j or (i != last_i and next_x < next_y):
@@ -347,9 +350,9 @@ def _nearest_on_wall(walls: FloatArray, k: int, x: float, y: float) -> tuple[flo
 
 @numba.njit(cache=True)
 def _nearest_on_walls(ways: Ways, x: float, y: float) -> tuple[float, float]:
-    """Return the nearest place on a wall; infinite if it is more than a cell away."""
+    """Return the nearest place on a wall; infinite if none is within INTO_WALLS."""
     n_x, n_y = ways.n_x, ways.n_y
-    best_x, best_y, least = math.inf, math.inf, 1.0
+    best_x, best_y, least = math.inf, math.inf, INTO_WALLS
     for i in range(max(int(x) - 1, 0), min(int(x) + 2, n_x)):
         for c in range(i * n_y + max(int(y) - 1, 0), i * n_y + min(int(y) + 2, n_y)):
             for k in range(ways.wall_begins[c], ways.wall_begins[c + 1]):
