@@ -18,11 +18,11 @@ from hrsnake_env.maze import Maze
 
 __all__ = ["GeodesicDistance", "Ways", "distance_at", "look_ahead"]
 
-CELLS_PER_WIDTH = 8
+CELLS_PER_WIDTH = 4
 """Grid cells across the mean width of the free space."""
 
-MAX_CELLS = 1000
-"""Along the maze's diagonal: narrower mazes have coarser grids, which cost time at a query, not exactness."""
+MAX_CELLS = 400
+"""Grid cells along the maze's diagonal, at most. Coarser grids cost time in a query, not exactness."""
 
 OFF_WALL = 1e-7
 """In cells. Ways keep this far off the walls: rounding then never decides whether a wall is in the way."""
@@ -30,15 +30,18 @@ OFF_WALL = 1e-7
 MARGIN = 1e-6
 """In cells. A wall is listed in all cells that it comes this near to."""
 
-NEAR = 3
-"""In cells. Round a corner nodes are tried this far; farther ones only next to one whose way it is."""
+INTO_WALLS = 0.25
+"""In cells. Less deep in a wall there still is a way: out of it first, then on from the surface."""
+
+HALF_DIAGONAL = 0.71
+"""Of a cell, in cells, rounded up."""
 
 
 class Ways(NamedTuple):
     """Hold the shortest ways to the goal as plain arrays, for kernels.
 
     A shortest way runs straight from bend to bend, and bends at the walls' convex corners alone. Lengths and
-    places are in grid cells, from the grid's origin: node (i, j) is at (i, j), cell (i, j) right above it.
+    places are in grid cells, from the grid's origin: cell (i, j) goes from (i, j) to (i + 1, j + 1).
     """
 
     origin_x: float
@@ -46,8 +49,9 @@ class Ways(NamedTuple):
     origin_y: float
     cell: float
     """Side of a cell, in maze units."""
-    first: NDArray[np.int32]
-    """The first bend of the way from each node, shape (n_x, n_y); -1 in walls."""
+    n_x: int
+    """Number of cells along each axis; cell (i, j) is number i * n_y + j."""
+    n_y: int
     bends: FloatArray
     """The goal, then the corners, shape (n_bends, 2)."""
     lengths: FloatArray
@@ -56,20 +60,23 @@ class Ways(NamedTuple):
     """The bend after each bend, shape (n_bends,)."""
     walls: FloatArray
     """Start and end of each wall, shape (n_walls, 4)."""
-    corner: NDArray[np.int32]
-    """The bend at the start of each wall, or -1, shape (n_walls,)."""
-    begins: NDArray[np.int32]
-    """Where the list of each cell's walls begins in `listed`, shape (n_x * n_y + 1,)."""
-    listed: NDArray[np.int32]
+    wall_begins: NDArray[np.int32]
+    """Where the walls of each cell begin in `cell_walls`, shape (n_cells + 1,)."""
+    cell_walls: NDArray[np.int32]
+    """The walls in each cell, cell by cell."""
+    bend_begins: NDArray[np.int32]
+    """Where the bends of each cell begin in `cell_bends`, shape (n_cells + 1,)."""
+    cell_bends: NDArray[np.int32]
+    """The bends with which a way from each cell can begin, cell by cell."""
 
 
 class GeodesicDistance:
     """Tell how far it is from any place to the goal without crossing a wall, and where the way goes.
 
-    The ways are exact: they bend at the walls' corners, whose ways come from Dijkstra's algorithm on the graph
-    of corners that see each other. A grid keeps the first bend of the way from each node; a query tries the
-    bends of the nodes around. The distance changes by no more than the length of a step (within 1e-6 cells
-    and, very rarely, by more where the nodes around miss a bend), and falls all along the way.
+    Exact: shortest ways bend at the walls' corners, and Dijkstra's algorithm on the graph of corners that see
+    each other finds those from the corners. From other places the first bend is looked up: a grid holds the
+    few that come into question in each cell. So the distance changes by no more than the length of a step,
+    and falls by that length all along the way, to within 1e-6 cells (see `Ways`).
 
     Parameters
     ----------
@@ -88,7 +95,7 @@ class GeodesicDistance:
         place = np.array(maze.goal if goal is None else goal, dtype=np.float64)
         if place.shape != (2,) or not shapely.contains_xy(maze.free_space, *place):
             raise InputError(f"Expected a goal (x, y) in the free space, got {place.tolist()}.")
-        self.ways = _frozen(_ways(maze, place))
+        self.ways = _ways(maze, place)
         if not math.isfinite(self(maze.base_pose[:2])):
             raise InputError(
                 f"Expected a way to the goal of maze '{maze.name}' that is wider than "
@@ -96,7 +103,7 @@ class GeodesicDistance:
             )
 
     def __call__(self, point: ArrayLike) -> float:
-        """Return the distance from a point, shape (2,), in maze units; infinite far inside a wall."""
+        """Return the distance from a point, shape (2,), in maze units; infinite deep in a wall."""
         x, y = np.asarray(point, dtype=np.float64)
         return float(distance_at(self.ways, x, y))
 
@@ -113,10 +120,17 @@ class GeodesicDistance:
         Returns
         -------
         places : array, shape (n, 2)
-            In maze units: the goal where it is nearer, and the point itself far inside a wall.
+            In maze units: the goal where it is nearer, and the point itself deep in a wall.
+
+        Raises
+        ------
+        InputError
+            If a distance is negative or not a number.
         """
         x, y = np.asarray(point, dtype=np.float64)
-        along = np.ascontiguousarray(distances, dtype=np.float64)
+        along = np.array(distances, dtype=np.float64)
+        if not (along.ndim == 1 and (along >= 0.0).all()):
+            raise InputError(f"Expected a list of distances that are not negative, got {distances!r}.")
         places = np.empty((len(along), 2))
         look_ahead(self.ways, x, y, along, places)
         return places
@@ -127,6 +141,7 @@ class GeodesicDistance:
 
 
 def _frozen(ways: Ways) -> Ways:
+    """Make all arrays read-only; kernels are compiled for such alone."""
     for array in ways:
         if isinstance(array, np.ndarray):
             array.setflags(write=False)
@@ -134,53 +149,58 @@ def _frozen(ways: Ways) -> Ways:
 
 
 def _ways(maze: Maze, goal: FloatArray) -> Ways:
-    """Find the shortest ways from all corners and grid nodes."""
+    """Find the shortest ways from all corners, and the corners with which ways from each cell can begin."""
     mean_width = 2.0 * maze.free_space.area / maze.free_space.length
     cell = max(mean_width / CELLS_PER_WIDTH, maze.size / MAX_CELLS)
     low, high = np.reshape(maze.free_space.bounds, (2, 2))
     origin = low - 1.5 * cell
-    n_x, n_y = (np.ceil((high - origin) / cell) + 2).astype(int)
+    n_x, n_y = (int(n) for n in np.ceil((high - origin) / cell) + 2)
     rings = [(ring - origin) / cell for ring in maze.rings]
     walls = np.concatenate([np.hstack([ring[:-1], ring[1:]]) for ring in rings])
-    corner, places, ends = _corners(rings)
-    begins, listed = _listed(walls, n_x, n_y)
+    corners, ends = _corners(rings)
+    wall_begins, cell_walls = _by_cell(_walls_in_cells(walls, n_y), n_x * n_y)
     ways = Ways(
         origin_x=float(origin[0]),
         origin_y=float(origin[1]),
         cell=float(cell),
-        first=np.full((n_x, n_y), -1, dtype=np.int32),
-        bends=np.concatenate([((goal - origin) / cell)[None], places]),
-        lengths=np.full(1 + len(places), math.inf),
-        onward=np.zeros(1 + len(places), dtype=np.int32),
+        n_x=n_x,
+        n_y=n_y,
+        bends=np.concatenate([((goal - origin) / cell)[None], corners]),
+        lengths=np.zeros(len(ends)),
+        onward=np.zeros(len(ends), dtype=np.int32),
         walls=walls,
-        corner=corner,
-        begins=begins,
-        listed=listed,
+        wall_begins=wall_begins,
+        cell_walls=cell_walls,
+        bend_begins=np.zeros(n_x * n_y + 1, dtype=np.int32),
+        cell_bends=np.zeros(0, dtype=np.int32),
     )
-    ways.bends[0] = _off_walls(ways, *ways.bends[0])
-    pairs = _bends_in_sight(ways, ends)
-    gaps = np.linalg.norm(ways.bends[pairs[:, 0]] - ways.bends[pairs[:, 1]], axis=1)
-    graph = csr_array((gaps, (pairs[:, 0], pairs[:, 1])), shape=(len(ends), len(ends)))
-    ways.lengths[:], onward = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
-    ways.onward[:] = np.maximum(onward, 0)
-    reached = np.flatnonzero(np.isfinite(ways.lengths))
-    _spread(ways, reached[np.argsort(ways.lengths[reached])])
-    return ways
+    ways.bends[0] = _off_walls(_frozen(ways._replace(bends=ways.bends.copy())), *ways.bends[0])
+    lengths, onward = _ways_from_bends(_frozen(ways), ends)
+    ways = _frozen(ways._replace(lengths=lengths, onward=onward))
+    bend_begins, cell_bends = _by_cell(_bends_of_cells(ways, ends), n_x * n_y)
+    return _frozen(ways._replace(bend_begins=bend_begins, cell_bends=cell_bends))
 
 
-def _corners(rings: list[FloatArray]) -> tuple[NDArray[np.int32], FloatArray, FloatArray]:
+def _ways_from_bends(ways: Ways, ends: FloatArray) -> tuple[FloatArray, NDArray[np.int32]]:
+    """Return `Ways.lengths`, infinite where there is no way, and `Ways.onward`."""
+    a, b = _bends_in_sight(ways, ends).T
+    gaps = np.linalg.norm(ways.bends[a] - ways.bends[b], axis=1)
+    graph = csr_array((gaps, (a, b)), shape=(len(ends), len(ends)))
+    lengths, onward = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
+    return lengths, np.maximum(onward, 0).astype(np.int32)
+
+
+def _corners(rings: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Find the walls' convex corners.
 
     Returns
     -------
-    corner : array, shape (n_walls,)
-        The bend at the start of each wall (the goal being bend 0), or -1.
-    places : array, shape (n_corners, 2)
+    corners : array, shape (n_corners, 2)
         The corners, a little off the wall.
     ends : array, shape (1 + n_corners, 4)
-        The directions in which the two walls of each bend leave it; zeros for the goal.
+        The directions in which the two walls of each bend leave it; zeros for the goal, which is bend 0.
     """
-    corner, places, ends = [], [], [np.zeros((1, 4))]
+    corners, ends = [], [np.zeros((1, 4))]
     for ring in rings:
         after = np.diff(ring, axis=0)
         after /= np.linalg.norm(after, axis=1)[:, None]
@@ -190,17 +210,21 @@ def _corners(rings: list[FloatArray]) -> tuple[NDArray[np.int32], FloatArray, Fl
         )  # the free space is on the left
         outward = (before + after)[convex] @ np.array([[0.0, 1.0], [-1.0, 0.0]])
         outward /= np.linalg.norm(outward, axis=1)[:, None]
-        corner.append(convex)
-        places.append(ring[:-1][convex] + 2.0 * OFF_WALL * outward)
+        corners.append(ring[:-1][convex] + 2.0 * OFF_WALL * outward)
         ends.append(np.hstack([-before[convex], after[convex]]))
-    is_corner = np.concatenate(corner)
-    numbers = np.where(is_corner, np.cumsum(is_corner), -1).astype(np.int32)
-    return numbers, np.concatenate(places), np.concatenate(ends)
+    return np.concatenate(corners), np.concatenate(ends)
+
+
+def _by_cell(entries: FloatArray, n_cells: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Sort rows (cell, what is in it, rank); return where each cell begins, and what is in the cells."""
+    entries = entries[np.lexsort((entries[:, 2], entries[:, 0]))]
+    begins = np.searchsorted(entries[:, 0], np.arange(n_cells + 1))
+    return begins.astype(np.int32), entries[:, 1].astype(np.int32)
 
 
 @numba.njit(cache=True)
 def distance_at(ways: Ways, x: float, y: float) -> float:
-    """Return the distance from a place to the goal, in maze units; infinite far inside a wall."""
+    """Return the distance from a place to the goal, in maze units; infinite deep in a wall."""
     _, _, _, length = _way_from(ways, (x - ways.origin_x) / ways.cell, (y - ways.origin_y) / ways.cell)
     return length * ways.cell
 
@@ -229,8 +253,7 @@ def look_ahead(ways: Ways, x: float, y: float, distances: FloatArray, places: Fl
 @numba.njit(cache=True)
 def _way_from(ways: Ways, x: float, y: float) -> tuple[float, float, int, float]:
     """Return where the way from a place begins in the free space, its first bend, and its length."""
-    n_x, n_y = ways.first.shape
-    if not (0.0 <= x < n_x - 1 and 0.0 <= y < n_y - 1):
+    if not (0.0 <= x < ways.n_x and 0.0 <= y < ways.n_y):
         return x, y, -1, math.inf
     start_x, start_y = _off_walls(ways, x, y)
     bend, length = _first_bend(ways, start_x, start_y)
@@ -245,38 +268,20 @@ def _way_from(ways: Ways, x: float, y: float) -> tuple[float, float, int, float]
 @numba.njit(cache=True)
 def _first_bend(ways: Ways, x: float, y: float) -> tuple[int, float]:
     """Return the first bend of the shortest way from a place, and the way's length; -1 in a wall."""
-    i, j = int(x), int(y)
-    best, length = -1, math.inf
-    for di in range(2):
-        for dj in range(2):
-            best, length = _nearer(ways, x, y, ways.first[i + di, j + dj], best, length)
-    c = i * ways.first.shape[1] + j
-    for k in range(ways.begins[c], ways.begins[c + 1]):
-        best, length = _nearer(ways, x, y, ways.corner[ways.listed[k]], best, length)
-    if best < 0:  # in a gap between the nodes, or in a wall
-        for bend in range(len(ways.bends)):
-            best, length = _nearer(ways, x, y, bend, best, length)
-    tried = -1
-    while best > 0 and best != tried:  # a bend may be left out, as a taut string leaves it
-        tried = best
-        best, length = _nearer(ways, x, y, ways.onward[best], best, length)
-    return best, length
+    c = int(x) * ways.n_y + int(y)
+    best, least = -1, math.inf
+    for k in range(ways.bend_begins[c], ways.bend_begins[c + 1]):
+        bend = ways.cell_bends[k]
+        bend_x, bend_y = ways.bends[bend, 0], ways.bends[bend, 1]
+        length = math.hypot(bend_x - x, bend_y - y) + ways.lengths[bend]
+        if length < least and _wall_between(ways, x, y, bend_x, bend_y) < 0:
+            best, least = bend, length
+    return best, least
 
 
 @numba.njit(cache=True)
-def _nearer(ways: Ways, x: float, y: float, bend: int, best: int, length: float) -> tuple[int, float]:
-    """Return the better of two first bends, the second of which is in sight, and the way's length."""
-    if bend < 0 or bend == best:
-        return best, length
-    other = ways.lengths[bend] + math.hypot(ways.bends[bend, 0] - x, ways.bends[bend, 1] - y)
-    if other < length and _sees(ways, x, y, ways.bends[bend, 0], ways.bends[bend, 1]):
-        return bend, other
-    return best, length
-
-
-@numba.njit(cache=True)
-def _sees(ways: Ways, ax: float, ay: float, bx: float, by: float) -> bool:
-    """Tell whether no wall touches the line from a to b, going through the cells on it."""
+def _wall_between(ways: Ways, ax: float, ay: float, bx: float, by: float) -> int:
+    """Return a wall that touches the line from a to b, the first to be found in the cells on it, or -1."""
     i, j, last_i, last_j = int(ax), int(ay), int(bx), int(by)
     dx, dy = bx - ax, by - ay
     step_i, step_j = 1 if dx > 0.0 else -1, 1 if dy > 0.0 else -1
@@ -284,14 +289,13 @@ def _sees(ways: Ways, ax: float, ay: float, bx: float, by: float) -> bool:
     # When, between 0 at a and 1 at b, the line comes to the next column and to the next row of cells.
     next_x = ((i + 1 - ax) if dx > 0.0 else (ax - i)) * pace_x if dx != 0.0 else math.inf
     next_y = ((j + 1 - ay) if dy > 0.0 else (ay - j)) * pace_y if dy != 0.0 else math.inf
-    n_y = ways.first.shape[1]
     while True:
-        c = i * n_y + j
-        for k in range(ways.begins[c], ways.begins[c + 1]):
-            if _crosses(ways.walls, ways.listed[k], ax, ay, bx, by):
-                return False
+        c = i * ways.n_y + j
+        for k in range(ways.wall_begins[c], ways.wall_begins[c + 1]):
+            if _crosses(ways.walls, ways.cell_walls[k], ax, ay, bx, by):
+                return int(ways.cell_walls[k])
         if i == last_i and j == last_j:
-            return True
+            return -1
         if j == last_j or (i != last_i and next_x < next_y):
             i += step_i
             next_x += pace_x
@@ -319,17 +323,20 @@ def _crosses(walls: FloatArray, k: int, ax: float, ay: float, bx: float, by: flo
 
 @numba.njit(cache=True)
 def _off_walls(ways: Ways, x: float, y: float) -> tuple[float, float]:
-    """Return the place OFF_WALL in front of a wall, if (x, y) is nearer to one than that."""
-    c = int(x) * ways.first.shape[1] + int(y)
-    for _ in range(2):  # in a corner, off either wall
-        for k in range(ways.begins[c], ways.begins[c + 1]):
-            wall = ways.listed[k]
+    """Return a place in front of the walls, if (x, y) is nearer to one than OFF_WALL."""
+    c = int(x) * ways.n_y + int(y)
+    moved, n = True, 0
+    while moved and n < 50:  # in a corner, off either wall in turn; 50 times suffice if it is not very sharp
+        moved, n = False, n + 1
+        for k in range(ways.wall_begins[c], ways.wall_begins[c + 1]):
+            wall = ways.cell_walls[k]
             near_x, near_y = _nearest_on_wall(ways.walls, wall, x, y)
-            if math.hypot(x - near_x, y - near_y) >= OFF_WALL:
-                continue
             wx, wy = ways.walls[wall, 2] - ways.walls[wall, 0], ways.walls[wall, 3] - ways.walls[wall, 1]
-            share = 1.5 * OFF_WALL / math.hypot(wx, wy)
-            x, y = near_x - share * wy, near_y + share * wx
+            length, gap = math.hypot(wx, wy), math.hypot(x - near_x, y - near_y)
+            in_front = wx * (y - near_y) - wy * (x - near_x) > -0.99 * gap * length
+            if gap < (1.0 if in_front else 3.0) * OFF_WALL:  # it may just have been moved behind this wall
+                share = 1.5 * OFF_WALL / length
+                x, y, moved = near_x - share * wy, near_y + share * wx, True
     return x, y
 
 
@@ -343,13 +350,13 @@ def _nearest_on_wall(walls: FloatArray, k: int, x: float, y: float) -> tuple[flo
 
 @numba.njit(cache=True)
 def _nearest_on_walls(ways: Ways, x: float, y: float) -> tuple[float, float]:
-    """Return the nearest place on a wall; infinite if it is more than a cell away."""
-    n_x, n_y = ways.first.shape
-    best_x, best_y, least = math.inf, math.inf, 1.0
+    """Return the nearest place on a wall; infinite if none is within INTO_WALLS."""
+    n_x, n_y = ways.n_x, ways.n_y
+    best_x, best_y, least = math.inf, math.inf, INTO_WALLS
     for i in range(max(int(x) - 1, 0), min(int(x) + 2, n_x)):
         for c in range(i * n_y + max(int(y) - 1, 0), i * n_y + min(int(y) + 2, n_y)):
-            for k in range(ways.begins[c], ways.begins[c + 1]):
-                near_x, near_y = _nearest_on_wall(ways.walls, ways.listed[k], x, y)
+            for k in range(ways.wall_begins[c], ways.wall_begins[c + 1]):
+                near_x, near_y = _nearest_on_wall(ways.walls, ways.cell_walls[k], x, y)
                 gap = math.hypot(near_x - x, near_y - y)
                 if gap < least:
                     best_x, best_y, least = near_x, near_y, gap
@@ -357,79 +364,115 @@ def _nearest_on_walls(ways: Ways, x: float, y: float) -> tuple[float, float]:
 
 
 @numba.njit(cache=True)
-def _listed(walls: FloatArray, n_x: int, n_y: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """List the walls of each cell; returns `Ways.begins` and `Ways.listed`."""
-    begins = np.zeros(n_x * n_y + 1, dtype=np.int32)
-    listed = np.empty(0, dtype=np.int32)
-    for fill in (False, True):
-        for wall in range(len(walls)):
-            px, py, qx, qy = walls[wall]
-            if px > qx:
-                px, py, qx, qy = qx, qy, px, py
-            for i in range(int(px - MARGIN), int(qx + MARGIN) + 1):
-                # The part of the wall in this column of cells.
-                a, b = 0.0, 1.0
-                if qx > px:
-                    a = min(max((i - MARGIN - px) / (qx - px), 0.0), 1.0)
-                    b = min(max((i + 1 + MARGIN - px) / (qx - px), 0.0), 1.0)
-                low = min(py + a * (qy - py), py + b * (qy - py)) - MARGIN
-                high = max(py + a * (qy - py), py + b * (qy - py)) + MARGIN
-                for j in range(int(low), int(high) + 1):
-                    c = i * n_y + j
-                    if fill:
-                        begins[c] -= 1
-                        listed[begins[c]] = wall
-                    else:
-                        begins[c] += 1
-        if not fill:
-            begins[:] = np.cumsum(begins)
-            listed = np.empty(begins[-1], dtype=np.int32)
-    return begins, listed
+def _walls_in_cells(walls: FloatArray, n_y: int) -> FloatArray:
+    """Return rows (cell, wall, 0): the cells that each wall comes within MARGIN of."""
+    rows = [(0.0, 0.0, 0.0) for _ in range(0)]
+    for wall in range(len(walls)):
+        px, py, qx, qy = walls[wall]
+        if px > qx:
+            px, py, qx, qy = qx, qy, px, py
+        for i in range(int(px - MARGIN), int(qx + MARGIN) + 1):
+            a, b = 0.0, 1.0  # the part of the wall in this column of cells
+            if qx > px:
+                a = min(max((i - MARGIN - px) / (qx - px), 0.0), 1.0)
+                b = min(max((i + 1 + MARGIN - px) / (qx - px), 0.0), 1.0)
+            end_a, end_b = py + a * (qy - py), py + b * (qy - py)
+            for j in range(int(min(end_a, end_b) - MARGIN), int(max(end_a, end_b) + MARGIN) + 1):
+                rows.append((float(i * n_y + j), float(wall), 0.0))
+    return np.array(rows)
 
 
 @numba.njit(cache=True)
 def _bends_in_sight(ways: Ways, ends: FloatArray) -> NDArray[np.int64]:
-    """Return the pairs of bends that see each other, and at both of which a taut string could bend."""
+    """Return the pairs of bends that see each other, and round both of which a taut string could bend."""
     pairs = [(0, 0) for _ in range(0)]
     for a in range(len(ends)):
+        ax, ay = ways.bends[a]
         for b in range(a):
-            dx, dy = ways.bends[b, 0] - ways.bends[a, 0], ways.bends[b, 1] - ways.bends[a, 1]
-            if not (_grazes(ends[a], dx, dy) and _grazes(ends[b], dx, dy)):
-                continue
-            if _sees(ways, ways.bends[a, 0], ways.bends[a, 1], ways.bends[b, 0], ways.bends[b, 1]):
+            bx, by = ways.bends[b]
+            if (
+                _grazes(ends[a], bx - ax, by - ay)
+                and _grazes(ends[b], bx - ax, by - ay)
+                and _wall_between(ways, ax, ay, bx, by) < 0
+            ):
                 pairs.append((a, b))
-    return np.array(pairs).reshape(-1, 2)
+    found = np.empty((len(pairs), 2), dtype=np.int64)
+    for k in range(len(pairs)):
+        found[k] = pairs[k]
+    return found
 
 
 @numba.njit(cache=True)
 def _grazes(ends: FloatArray, dx: float, dy: float) -> bool:
     """Tell whether a line passes by a corner with both of its walls on one side."""
     one, other = dx * ends[1] - dy * ends[0], dx * ends[3] - dy * ends[2]
-    tolerance = 1e-5
-    return not (min(one, other) < -tolerance and max(one, other) > tolerance)
+    return not (min(one, other) < -MARGIN and max(one, other) > MARGIN)
 
 
 @numba.njit(cache=True)
-def _spread(ways: Ways, order: NDArray[np.int64]) -> None:
-    """Find the first bend of the way from each node: spread from each bend in the order of their lengths."""
-    n_x, n_y = ways.first.shape
-    lengths = np.full((n_x, n_y), math.inf)
-    tried = np.full((n_x, n_y), -1, dtype=np.int32)
-    stack = np.empty((n_x * n_y, 2), dtype=np.int32)
-    for bend in order:
+def _bends_of_cells(ways: Ways, ends: FloatArray) -> FloatArray:
+    """Return rows (cell, bend, length of the way over it): from which cells a way can begin with which bend.
+
+    Ways that begin with a bend come from places that see it, lie in its shadow (between the line on which the
+    way goes on, drawn backwards, and the wall), and have no shorter way. The cells that such places are in
+    hang together, so a flood from the bend finds them. A cell too many does no harm.
+    """
+    rows = [(0.0, 0.0, 0.0) for _ in range(0)]
+    n_cells = ways.n_x * ways.n_y
+    known = np.full(n_cells, math.inf)  # from anywhere in the cell there is a way no longer than this
+    reached = np.full(n_cells, -1, dtype=np.int32)
+    stack = np.empty(n_cells, dtype=np.int32)
+    for bend in np.argsort(ways.lengths):
+        if ways.lengths[bend] == math.inf:
+            break
         x, y = ways.bends[bend]
-        n, reach, i, j = 0, NEAR, int(x), int(y)
-        while n >= 0:
-            for a in range(max(i - reach, 0), min(i + reach + 1, n_x)):
-                for b in range(max(j - reach, 0), min(j + reach + 1, n_y)):
-                    if tried[a, b] == bend:
-                        continue
-                    tried[a, b] = bend
-                    length = ways.lengths[bend] + math.hypot(x - a, y - b)
-                    if length < lengths[a, b] and _sees(ways, a, b, x, y):
-                        lengths[a, b], ways.first[a, b] = length, bend
-                        stack[n] = a, b
+        stack[0], n = int(x) * ways.n_y + int(y), 1
+        reached[stack[0]] = bend
+        while n > 0:
+            n -= 1
+            c, i, j = stack[n], stack[n] // ways.n_y, stack[n] % ways.n_y
+            length = ways.lengths[bend] + math.hypot(i + 0.5 - x, j + 0.5 - y)
+            if length - HALF_DIAGONAL > known[c] or not _in_shadow(ways, ends, bend, i, j):
+                continue
+            wall = _wall_between(ways, x, y, i - MARGIN, j - MARGIN)
+            if wall >= 0 and _hides(ways.walls, wall, x, y, i, j):
+                continue
+            if wall < 0 and ways.wall_begins[c] == ways.wall_begins[c + 1]:
+                known[c] = min(
+                    known[c], length + 3.1 * HALF_DIAGONAL
+                )  # by the corner of the cell that is seen
+            rows.append((float(c), float(bend), length))
+            for a in range(max(i - 1, 1), min(i + 2, ways.n_x - 1)):
+                for near in range(a * ways.n_y + max(j - 1, 1), a * ways.n_y + min(j + 2, ways.n_y - 1)):
+                    if reached[near] != bend:
+                        reached[near], stack[n] = bend, near
                         n += 1
-            n, reach = n - 1, 1
-            if n >= 0:
-                i, j = stack[n]
+    return np.array(rows)
+
+
+@numba.njit(cache=True)
+def _in_shadow(ways: Ways, ends: FloatArray, bend: int, i: int, j: int) -> bool:
+    """Tell whether ways from places in cell (i, j) can turn round a bend towards the next one."""
+    if bend == 0:
+        return True
+    x, y = ways.bends[bend]
+    on_x, on_y = ways.bends[ways.onward[bend], 0] - x, ways.bends[ways.onward[bend], 1] - y
+    gap = math.hypot(on_x, on_y)
+    on_x, on_y = on_x / gap, on_y / gap
+    side = on_x * (ends[bend, 1] + ends[bend, 3]) - on_y * (ends[bend, 0] + ends[bend, 2])
+    turn = 1.0 if side > 0.0 else -1.0  # counter-clockwise, if the walls are on the left
+    dx, dy = x - (i + 0.5), y - (j + 0.5)
+    for ux, uy in ((on_x, on_y), (ends[bend, 0], ends[bend, 1]), (ends[bend, 2], ends[bend, 3])):
+        if turn * (dx * uy - dy * ux) < -0.5 * (abs(ux) + abs(uy)) - MARGIN:
+            return False
+    return True
+
+
+@numba.njit(cache=True)
+def _hides(walls: FloatArray, wall: int, x: float, y: float, i: int, j: int) -> bool:
+    """Tell whether a wall hides all of cell (i, j) from (x, y): all four corners."""
+    for a in (i - MARGIN, i + 1 + MARGIN):
+        for b in (j - MARGIN, j + 1 + MARGIN):
+            if not _crosses(walls, wall, x, y, a, b):
+                return False
+    return True
