@@ -18,7 +18,7 @@ from hrsnake_env import task
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.contacts import PinchReport
 from hrsnake_env.errors import InputError
-from hrsnake_env.geodesic import GeodesicDistance
+from hrsnake_env.geodesic import GeodesicDistance, look_ahead
 from hrsnake_env.maze import Maze
 from hrsnake_env.observation import AHEAD, observation_space, write_observation
 from hrsnake_env.options import ResetOptions
@@ -311,7 +311,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         )
         self._ahead = np.array(AHEAD) * link_length
         self._target, self._wanted = np.zeros(1 + n_links), np.zeros(1 + n_links)
-        self._no_rays, self._no_ahead = np.zeros(0), np.zeros((len(AHEAD), 2))
+        self._no_rays, self._places = np.zeros(0), np.zeros((len(AHEAD), 2))
         size = (HEIGHT, HEIGHT) if self._random else None
         self._view = View(size, fps=self.metadata["render_fps"])
         self._eye = View((image_size, image_size), fps=self.metadata["render_fps"])
@@ -414,9 +414,6 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         senses = physics.sense()
         shape = self.observation_space if goal else self.observation_space["observation"]  # type: ignore[index]
         vector = np.empty(shape.shape, dtype=np.float32)  # type: ignore[arg-type]
-        ahead = self._no_ahead
-        if goal and physics.finite:
-            ahead = self._scene.distance.ahead(senses.readings[1:3], self._ahead)
         write_observation(
             *senses,
             self._target,
@@ -425,7 +422,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             goal,
             self.maze.goal,
             self._tally.distance / (2.0 * self._scene.way),
-            ahead,
+            self._places,
             physics.cast_rays() if self._rays else self._no_rays,
             vector,
         )
@@ -516,6 +513,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         self.physics.set_state(state.physics)
         self._task_id = state.task_id
         self._target = state.target.copy()
+        self._look_ahead()
         self._tally = state.tally.copy()
 
     # What it is made of
@@ -564,7 +562,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         physics.reset(feed, joint_angles)
         self._target[:] = physics.target
         self._tally = Tally(distance=self._scene.way)
-        self._tally.distance = self._distance_now()
+        self._tally.distance = self._look_ahead()
         if feed > 0.0:
             self._check_start()
 
@@ -586,7 +584,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         """Return whether the step has ended the episode, and its reward."""
         tally, physics, length = self._tally, self.physics, self.arm.link_length
         tally.see(physics.pose_contacts)
-        before, tally.distance = tally.distance, self._distance_now()
+        before, tally.distance = tally.distance, self._look_ahead()
         jammed = (
             not physics.finite
             or physics.node_error > task.JAM_NODE_ERROR * length
@@ -631,11 +629,12 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         readings, goal = self.physics.sense().readings.tolist(), self._goal
         return math.hypot(readings[1] - goal[0], readings[2] - goal[1])
 
-    def _distance_now(self) -> float:
-        """Return the way from the tip to the goal; with the tip in a wall, what it was before."""
-        if not self.physics.finite:
-            return self._tally.distance
-        distance = self._scene.distance(self.physics.sense().readings[1:3])
+    def _look_ahead(self) -> float:
+        """Return the way from the tip to the goal; with the tip deep in a wall, what it was before."""
+        distance = math.inf
+        if self.physics.finite:
+            _, x, y, *_ = self.physics.sense().readings.tolist()
+            distance = look_ahead(self._scene.distance.ways, x, y, self._ahead, self._places)
         return distance if math.isfinite(distance) else self._tally.distance
 
     def _info(self) -> dict[str, Any]:

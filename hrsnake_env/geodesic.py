@@ -230,8 +230,14 @@ def distance_at(ways: Ways, x: float, y: float) -> float:
 
 
 @numba.njit(cache=True)
-def look_ahead(ways: Ways, x: float, y: float, distances: FloatArray, places: FloatArray) -> None:
-    """Write the places at some distances ahead of (x, y) on the way to the goal, all in maze units."""
+def look_ahead(ways: Ways, x: float, y: float, distances: FloatArray, places: FloatArray) -> float:
+    """Write the places at some distances ahead of (x, y) on the way to the goal, all in maze units.
+
+    Returns
+    -------
+    distance : float
+        As `distance_at` has it.
+    """
     u, v = (x - ways.origin_x) / ways.cell, (y - ways.origin_y) / ways.cell
     start_u, start_v, first, length = _way_from(ways, u, v)
     for k in range(len(distances)):
@@ -248,6 +254,7 @@ def look_ahead(ways: Ways, x: float, y: float, distances: FloatArray, places: Fl
             next_u, next_v, bend = ways.bends[bend, 0], ways.bends[bend, 1], ways.onward[bend]
         places[k, 0] = ways.origin_x + ways.cell * here_u
         places[k, 1] = ways.origin_y + ways.cell * here_v
+    return length * ways.cell
 
 
 @numba.njit(cache=True)
