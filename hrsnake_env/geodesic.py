@@ -18,17 +18,20 @@ from hrsnake_env.maze import Maze
 
 __all__ = ["GeodesicDistance", "Ways", "distance_at", "look_ahead"]
 
-CELLS_PER_WIDTH = 8
+CELLS_PER_WIDTH = 4
 """Grid cells across the mean width of the free space."""
 
-MAX_CELLS = 1000
-"""Along the maze's diagonal: narrower mazes have coarser grids, which cost time at a query, not exactness."""
+MAX_CELLS = 400
+"""Grid cells along the maze's diagonal, at most. Coarser grids cost time in a query, not exactness."""
 
 OFF_WALL = 1e-7
 """In cells. Ways keep this far off the walls: rounding then never decides whether a wall is in the way."""
 
 MARGIN = 1e-6
 """In cells. A wall is listed in all cells that it comes this near to."""
+
+INTO_WALLS = 0.25
+"""In cells. Less deep in a wall there still is a way: out of it first, then on from the surface."""
 
 HALF_DIAGONAL = 0.71
 """Of a cell, in cells, rounded up."""
@@ -70,10 +73,10 @@ class Ways(NamedTuple):
 class GeodesicDistance:
     """Tell how far it is from any place to the goal without crossing a wall, and where the way goes.
 
-    The ways are exact: they bend at the walls' corners, whose ways come from Dijkstra's algorithm on the graph
-    of corners that see each other. A grid keeps the first bend of the way from each node; a query tries the
-    bends of the nodes around. The distance changes by no more than the length of a step (within 1e-6 cells
-    and, very rarely, by more where the nodes around miss a bend), and falls all along the way.
+    Exact: shortest ways bend at the walls' corners, and Dijkstra's algorithm on the graph of corners that see
+    each other finds those from the corners. From other places the first bend is looked up: a grid holds the
+    few that come into question in each cell. So the distance changes by no more than the length of a step,
+    and falls by that length all along the way, to within 1e-6 cells (see `Ways`).
 
     Parameters
     ----------
@@ -92,7 +95,7 @@ class GeodesicDistance:
         place = np.array(maze.goal if goal is None else goal, dtype=np.float64)
         if place.shape != (2,) or not shapely.contains_xy(maze.free_space, *place):
             raise InputError(f"Expected a goal (x, y) in the free space, got {place.tolist()}.")
-        self.ways = _frozen(_ways(maze, place))
+        self.ways = _ways(maze, place)
         if not math.isfinite(self(maze.base_pose[:2])):
             raise InputError(
                 f"Expected a way to the goal of maze '{maze.name}' that is wider than "
@@ -100,7 +103,7 @@ class GeodesicDistance:
             )
 
     def __call__(self, point: ArrayLike) -> float:
-        """Return the distance from a point, shape (2,), in maze units; infinite far inside a wall."""
+        """Return the distance from a point, shape (2,), in maze units; infinite deep in a wall."""
         x, y = np.asarray(point, dtype=np.float64)
         return float(distance_at(self.ways, x, y))
 
@@ -117,10 +120,17 @@ class GeodesicDistance:
         Returns
         -------
         places : array, shape (n, 2)
-            In maze units: the goal where it is nearer, and the point itself far inside a wall.
+            In maze units: the goal where it is nearer, and the point itself deep in a wall.
+
+        Raises
+        ------
+        InputError
+            If a distance is negative or not a number.
         """
         x, y = np.asarray(point, dtype=np.float64)
-        along = np.ascontiguousarray(distances, dtype=np.float64)
+        along = np.array(distances, dtype=np.float64)
+        if not (along.ndim == 1 and (along >= 0.0).all()):
+            raise InputError(f"Expected a list of distances that are not negative, got {distances!r}.")
         places = np.empty((len(along), 2))
         look_ahead(self.ways, x, y, along, places)
         return places
@@ -131,6 +141,7 @@ class GeodesicDistance:
 
 
 def _frozen(ways: Ways) -> Ways:
+    """Make all arrays read-only; kernels are compiled for such alone."""
     for array in ways:
         if isinstance(array, np.ndarray):
             array.setflags(write=False)
@@ -163,14 +174,20 @@ def _ways(maze: Maze, goal: FloatArray) -> Ways:
         bend_begins=np.zeros(n_x * n_y + 1, dtype=np.int32),
         cell_bends=np.zeros(0, dtype=np.int32),
     )
-    ways.bends[0] = _off_walls(ways, *ways.bends[0])
+    ways.bends[0] = _off_walls(_frozen(ways._replace(bends=ways.bends.copy())), *ways.bends[0])
+    lengths, onward = _ways_from_bends(_frozen(ways), ends)
+    ways = _frozen(ways._replace(lengths=lengths, onward=onward))
+    bend_begins, cell_bends = _by_cell(_bends_of_cells(ways, ends), n_x * n_y)
+    return _frozen(ways._replace(bend_begins=bend_begins, cell_bends=cell_bends))
+
+
+def _ways_from_bends(ways: Ways, ends: FloatArray) -> tuple[FloatArray, NDArray[np.int32]]:
+    """Return `Ways.lengths`, infinite where there is no way, and `Ways.onward`."""
     a, b = _bends_in_sight(ways, ends).T
     gaps = np.linalg.norm(ways.bends[a] - ways.bends[b], axis=1)
     graph = csr_array((gaps, (a, b)), shape=(len(ends), len(ends)))
-    ways.lengths[:], onward = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
-    ways.onward[:] = np.maximum(onward, 0)
-    bend_begins, cell_bends = _by_cell(_bends_of_cells(ways, ends), n_x * n_y)
-    return ways._replace(bend_begins=bend_begins, cell_bends=cell_bends)
+    lengths, onward = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
+    return lengths, np.maximum(onward, 0).astype(np.int32)
 
 
 def _corners(rings: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
@@ -188,7 +205,9 @@ def _corners(rings: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
         after = np.diff(ring, axis=0)
         after /= np.linalg.norm(after, axis=1)[:, None]
         before = np.roll(after, 1, axis=0)
-        convex = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] < 0.0  # the free space is on the left
+        convex = (
+            before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] < 0.0
+        )  # the free space is on the left
         outward = (before + after)[convex] @ np.array([[0.0, 1.0], [-1.0, 0.0]])
         outward /= np.linalg.norm(outward, axis=1)[:, None]
         corners.append(ring[:-1][convex] + 2.0 * OFF_WALL * outward)
@@ -197,7 +216,7 @@ def _corners(rings: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
 
 
 def _by_cell(entries: FloatArray, n_cells: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Sort rows (cell, what is in it, rank) by cell and rank; return where each cell begins, and what is in it."""
+    """Sort rows (cell, what is in it, rank); return where each cell begins, and what is in the cells."""
     entries = entries[np.lexsort((entries[:, 2], entries[:, 0]))]
     begins = np.searchsorted(entries[:, 0], np.arange(n_cells + 1))
     return begins.astype(np.int32), entries[:, 1].astype(np.int32)
@@ -205,7 +224,7 @@ def _by_cell(entries: FloatArray, n_cells: int) -> tuple[NDArray[np.int32], NDAr
 
 @numba.njit(cache=True)
 def distance_at(ways: Ways, x: float, y: float) -> float:
-    """Return the distance from a place to the goal, in maze units; infinite far inside a wall."""
+    """Return the distance from a place to the goal, in maze units; infinite deep in a wall."""
     _, _, _, length = _way_from(ways, (x - ways.origin_x) / ways.cell, (y - ways.origin_y) / ways.cell)
     return length * ways.cell
 
@@ -253,7 +272,7 @@ def _first_bend(ways: Ways, x: float, y: float) -> tuple[int, float]:
     best, least = -1, math.inf
     for k in range(ways.bend_begins[c], ways.bend_begins[c + 1]):
         bend = ways.cell_bends[k]
-        bend_x, bend_y = ways.bends[bend]
+        bend_x, bend_y = ways.bends[bend, 0], ways.bends[bend, 1]
         length = math.hypot(bend_x - x, bend_y - y) + ways.lengths[bend]
         if length < least and _wall_between(ways, x, y, bend_x, bend_y) < 0:
             best, least = bend, length
@@ -274,7 +293,7 @@ def _wall_between(ways: Ways, ax: float, ay: float, bx: float, by: float) -> int
         c = i * ways.n_y + j
         for k in range(ways.wall_begins[c], ways.wall_begins[c + 1]):
             if _crosses(ways.walls, ways.cell_walls[k], ax, ay, bx, by):
-                return ways.cell_walls[k]
+                return int(ways.cell_walls[k])
         if i == last_i and j == last_j:
             return -1
         if j == last_j or (i != last_i and next_x < next_y):
@@ -304,17 +323,20 @@ def _crosses(walls: FloatArray, k: int, ax: float, ay: float, bx: float, by: flo
 
 @numba.njit(cache=True)
 def _off_walls(ways: Ways, x: float, y: float) -> tuple[float, float]:
-    """Return the place OFF_WALL in front of a wall, if (x, y) is nearer to one than that."""
+    """Return a place in front of the walls, if (x, y) is nearer to one than OFF_WALL."""
     c = int(x) * ways.n_y + int(y)
-    for _ in range(2):  # in a corner, off either wall
+    moved, n = True, 0
+    while moved and n < 50:  # in a corner, off either wall in turn; 50 times suffice if it is not very sharp
+        moved, n = False, n + 1
         for k in range(ways.wall_begins[c], ways.wall_begins[c + 1]):
             wall = ways.cell_walls[k]
             near_x, near_y = _nearest_on_wall(ways.walls, wall, x, y)
-            if math.hypot(x - near_x, y - near_y) >= OFF_WALL:
-                continue
             wx, wy = ways.walls[wall, 2] - ways.walls[wall, 0], ways.walls[wall, 3] - ways.walls[wall, 1]
-            share = 1.5 * OFF_WALL / math.hypot(wx, wy)
-            x, y = near_x - share * wy, near_y + share * wx
+            length, gap = math.hypot(wx, wy), math.hypot(x - near_x, y - near_y)
+            in_front = wx * (y - near_y) - wy * (x - near_x) > -0.99 * gap * length
+            if gap < (1.0 if in_front else 3.0) * OFF_WALL:  # it may just have been moved behind this wall
+                share = 1.5 * OFF_WALL / length
+                x, y, moved = near_x - share * wy, near_y + share * wx, True
     return x, y
 
 
@@ -328,9 +350,9 @@ def _nearest_on_wall(walls: FloatArray, k: int, x: float, y: float) -> tuple[flo
 
 @numba.njit(cache=True)
 def _nearest_on_walls(ways: Ways, x: float, y: float) -> tuple[float, float]:
-    """Return the nearest place on a wall; infinite if it is more than a cell away."""
+    """Return the nearest place on a wall; infinite if none is within INTO_WALLS."""
     n_x, n_y = ways.n_x, ways.n_y
-    best_x, best_y, least = math.inf, math.inf, 1.0
+    best_x, best_y, least = math.inf, math.inf, INTO_WALLS
     for i in range(max(int(x) - 1, 0), min(int(x) + 2, n_x)):
         for c in range(i * n_y + max(int(y) - 1, 0), i * n_y + min(int(y) + 2, n_y)):
             for k in range(ways.wall_begins[c], ways.wall_begins[c + 1]):
@@ -368,9 +390,12 @@ def _bends_in_sight(ways: Ways, ends: FloatArray) -> NDArray[np.int64]:
         ax, ay = ways.bends[a]
         for b in range(a):
             bx, by = ways.bends[b]
-            if _grazes(ends[a], bx - ax, by - ay) and _grazes(ends[b], bx - ax, by - ay):
-                if _wall_between(ways, ax, ay, bx, by) < 0:
-                    pairs.append((a, b))
+            if (
+                _grazes(ends[a], bx - ax, by - ay)
+                and _grazes(ends[b], bx - ax, by - ay)
+                and _wall_between(ways, ax, ay, bx, by) < 0
+            ):
+                pairs.append((a, b))
     found = np.empty((len(pairs), 2), dtype=np.int64)
     for k in range(len(pairs)):
         found[k] = pairs[k]
@@ -413,7 +438,9 @@ def _bends_of_cells(ways: Ways, ends: FloatArray) -> FloatArray:
             if wall >= 0 and _hides(ways.walls, wall, x, y, i, j):
                 continue
             if wall < 0 and ways.wall_begins[c] == ways.wall_begins[c + 1]:
-                known[c] = min(known[c], length + 3.1 * HALF_DIAGONAL)  # by the corner of the cell that is seen
+                known[c] = min(
+                    known[c], length + 3.1 * HALF_DIAGONAL
+                )  # by the corner of the cell that is seen
             rows.append((float(c), float(bend), length))
             for a in range(max(i - 1, 1), min(i + 2, ways.n_x - 1)):
                 for near in range(a * ways.n_y + max(j - 1, 1), a * ways.n_y + min(j + 2, ways.n_y - 1)):
