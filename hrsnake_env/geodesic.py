@@ -205,9 +205,8 @@ def _corners(rings: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
         after = np.diff(ring, axis=0)
         after /= np.linalg.norm(after, axis=1)[:, None]
         before = np.roll(after, 1, axis=0)
-        convex = (
-            before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] < 0.0
-        )  # the free space is on the left
+        # The free space is on the left: at its reflex corners the walls turn right.
+        convex = before[:, 0] * after[:, 1] < before[:, 1] * after[:, 0]
         outward = (before + after)[convex] @ np.array([[0.0, 1.0], [-1.0, 0.0]])
         outward /= np.linalg.norm(outward, axis=1)[:, None]
         corners.append(ring[:-1][convex] + 2.0 * OFF_WALL * outward)
