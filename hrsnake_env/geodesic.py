@@ -437,9 +437,8 @@ def _bends_of_cells(ways: Ways, ends: FloatArray) -> FloatArray:
             if wall >= 0 and _hides(ways.walls, wall, x, y, i, j):
                 continue
             if wall < 0 and ways.wall_begins[c] == ways.wall_begins[c + 1]:
-                known[c] = min(
-                    known[c], length + 3.1 * HALF_DIAGONAL
-                )  # by the corner of the cell that is seen
+                # By way of the corner of the cell that the bend sees.
+                known[c] = min(known[c], length + 3.1 * HALF_DIAGONAL)
             rows.append((float(c), float(bend), length))
             for a in range(max(i - 1, 1), min(i + 2, ways.n_x - 1)):
                 for near in range(a * ways.n_y + max(j - 1, 1), a * ways.n_y + min(j + 2, ways.n_y - 1)):
