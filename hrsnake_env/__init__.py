@@ -4,10 +4,12 @@ import gymnasium
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
+from hrsnake_env.ladder import LADDER
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import MAZES
+from hrsnake_env.random_mazes import random_maze, task_maze
 
-__all__ = ["MAZES", "ArmSpec", "InputError", "Maze"]
+__all__ = ["LADDER", "MAZES", "ArmSpec", "InputError", "Maze", "random_maze", "task_maze"]
 
 ENVIRONMENTS = {
     "HyperRedundantMaze-v0": {

@@ -21,13 +21,16 @@ from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
 
-__all__ = ["MAZES", "SEEDED_MAZES", "Maze"]
+__all__ = ["MAZES", "RUNG_MAZES", "SEEDED_MAZES", "Maze"]
 
 MITRE_LIMIT = 10.0
 """Corridor corners sharper than about 11 degrees are cut off; all others are square."""
 
 MAZES: dict[str, Callable[[], Maze]] = {}
 """The builders of the named mazes, in the order in which they are listed; `hrsnake_env.mazes` fills it."""
+
+RUNG_MAZES: dict[str, Callable[[], Maze]] = {}
+"""The builders of the ladder's own mazes, made for one link length each; `hrsnake_env.ladder` fills it."""
 
 SEEDED_MAZES: dict[str, Callable[[int], Maze]] = {}
 """The builders of random mazes, by the name before the seed: `clutter-7` is the hall drawn from seed 7."""
@@ -158,8 +161,8 @@ class Maze:
         Parameters
         ----------
         source : str or path
-            One of `MAZES`, one of `SEEDED_MAZES` with a seed (`clutter-7`), or the path of a `.geojson` or
-            `.json` file.
+            One of `MAZES` or `RUNG_MAZES`, one of `SEEDED_MAZES` with a seed (`clutter-7`), or the path of a
+            `.geojson` or `.json` file.
 
         Raises
         ------
@@ -172,13 +175,14 @@ class Maze:
         array([240., 700.])
         """
         text = os.fspath(source)
-        if text in MAZES:
-            return MAZES[text]()
-        kind, _, seed = text.partition("-")
+        for named in (MAZES, RUNG_MAZES):
+            if text in named:
+                return named[text]()
+        kind, _, seed = text.rpartition("-")
         if kind in SEEDED_MAZES and seed.isascii() and seed.isdigit():
             return SEEDED_MAZES[kind](int(seed))
         if Path(text).suffix.lower() not in (".geojson", ".json"):
-            names = [*MAZES, *(f"{kind}-SEED" for kind in SEEDED_MAZES)]
+            names = [*MAZES, *(f"{kind}-SEED" for kind in SEEDED_MAZES), *RUNG_MAZES]
             raise InputError(
                 f"Unknown maze {text!r}. Available: {', '.join(names)}; or give the path of a .geojson file."
             )
