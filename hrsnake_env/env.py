@@ -273,7 +273,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             }
             maze = task_maze(split, 0, **self._random)
         self._split, self._goal_radius = split, goal_radius
-        self._physics_options = {
+        self._physics_options: dict[str, Any] = {
             "substeps": substeps,
             "torque_limit": torque_limit,
             "actuation": actuation,

@@ -51,7 +51,7 @@ def actions_of(
     parts = np.maximum(np.ceil(np.abs(changes / steps).max(axis=1) - 1e-9), 1.0).astype(int)
     changes = np.repeat(changes / parts[:, None], parts, axis=0)
     if action == "delta":
-        return changes / steps
+        return np.asarray(changes / steps)
     number = np.concatenate([np.arange(n) for n in parts]) - np.repeat(parts, parts) + 1
     targets = np.repeat(poses[1:], parts, axis=0) + number[:, None] * changes
     reach = motion.n_links * motion.link_length
@@ -204,6 +204,6 @@ def _batch_shape(observation: Any) -> tuple[int, ...]:
     """Return () for one observation, (n_envs,) for a batch; dictionaries go by their vector."""
     if isinstance(observation, Mapping):
         observation = observation["observation"]
-    shape = np.shape(observation)
+    shape: tuple[int, ...] = np.shape(observation)
     one = 1 if len(shape) <= 2 else 3  # a vector or a picture
     return shape[: len(shape) - one]
