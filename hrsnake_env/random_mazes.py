@@ -177,6 +177,8 @@ def task_maze(
 ) -> Maze:
     """Return the maze of a task, whose difficulty is drawn from a range by the task's own seed.
 
+    It bears the task's name; under that name `Maze.load` gives the maze for the default arm and range.
+
     Parameters
     ----------
     split : str
