@@ -15,10 +15,10 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Wedge
 
+from hrsnake_env.appearance import COLOURS
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
-from hrsnake_env.rendering import COLOURS
 from planners.corners import critical_corners
 from planners.figures import draw_rings, draw_walls
 from planners.kernels.rod import free_directions

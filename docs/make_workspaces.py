@@ -19,7 +19,7 @@ from hrsnake_env.arm import ArmSpec
 from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import PAPER_LINK_LENGTHS
-from hrsnake_env.rendering import MazePicture
+from hrsnake_env.pictures import MazePicture
 from planners import Motion, plan, rod_bound
 from planners.figures import draw_beams, draw_path, draw_stages
 from planners.rollout import Episode, simulate_motion

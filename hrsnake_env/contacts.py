@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -98,10 +99,18 @@ class ContactLog:
         self._done: list[Contact] = []
         self._current: dict[ContactKey, _Entry] = {}
 
+    def copy(self) -> ContactLog:
+        """Return a log that goes on by itself."""
+        log = ContactLog(self.tolerance)
+        log.pose, log._done = self.pose, self._done.copy()
+        log._current = {key: dataclasses.replace(entry) for key, entry in self._current.items()}
+        return log
+
     def begin_pose(self, pose: int) -> None:
         """Close the records of the last pose."""
-        self._done.extend(self._close())
-        self._current.clear()
+        if self._current:
+            self._done.extend(self._close())
+            self._current.clear()
         self.pose = pose
 
     def touch(
@@ -124,7 +133,7 @@ class ContactLog:
     @property
     def current(self) -> tuple[Contact, ...]:
         """The contacts of the present pose."""
-        return tuple(self._close())
+        return tuple(self._close()) if self._current else ()
 
     def _close(self) -> Iterable[Contact]:
         # What is solid behind the surface matters where the surface itself has not told of a collision.

@@ -13,11 +13,12 @@ import numpy as np
 from hrsnake_env.arm import FEEDER_RELEASE, FloatArray
 
 __all__ = [
-    "deviation",
+    "divide",
+    "drive",
     "largest_move",
     "limited_forces",
-    "link_distances",
     "place_links",
+    "read_links",
     "servo_forces",
     "step_targets",
 ]
@@ -305,71 +306,87 @@ def deviation(
 
 
 @numba.njit(cache=True)
-def _point_distance2(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
-    """Compute the squared distance from a point to a segment."""
-    dx, dy = bx - ax, by - ay
-    length2 = dx * dx + dy * dy
-    t = 0.0 if length2 == 0.0 else ((px - ax) * dx + (py - ay) * dy) / length2
-    t = min(max(t, 0.0), 1.0)
-    qx, qy = px - ax - t * dx, py - ay - t * dy
-    return qx * qx + qy * qy
+def divide(
+    start: FloatArray, end: FloatArray, link_length: float, largest: float, targets: FloatArray
+) -> int:
+    """Divide a change of the configuration into the rows of `targets`, as `step_targets` does.
+
+    Returns
+    -------
+    parts : int
+        Each of them must be divided into so many parts again, lest a joint moves farther than `largest`.
+    """
+    step_targets(start, end, link_length, targets)
+    return math.ceil(largest_move(start, targets, link_length) / largest)
 
 
 @numba.njit(cache=True)
-def _cross(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> float:
-    return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-
-
-@numba.njit(cache=True)
-def link_distances(
-    joints: FloatArray, n_held: int, walls: FloatArray, reach: float, distances: FloatArray
+def drive(
+    target: FloatArray,
+    last_target: FloatArray,
+    state: FloatArray,
+    link_length: float,
+    timestep: float,
+    torque_limit: float,
+    n_held: int,
+    poses: FloatArray,
+    nodes: FloatArray,
+    forces: FloatArray,
+    torques: FloatArray,
+    effort: FloatArray,
 ) -> None:
-    """Compute the distance from the centre line of each link, as far as it is in the maze, to the walls.
+    """Compute where the links belong after a substep (`place_links`), and the forces that take them there.
 
     Parameters
     ----------
-    joints : array, shape (n_links + 1, 2)
-        Base end first.
-    n_held : int
-        So many joints at the base end are held by the feeder: the links before the last of them are not in
-        the maze, and the link behind it only in front of the base.
-    walls : array, shape (n_walls, 4)
-        x, y of the start and of the end of each wall segment.
-    reach : float
-        Distances are not looked for beyond it.
-    distances : array, shape (n_links,)
-        Written: 0 where a link crosses a wall, at most `reach`.
+    effort : array, shape (1 + n_links,)
+        Feed force and joint torques are added to it.
+    target, last_target, state, link_length, timestep, n_held, poses, nodes, forces, torques
+        See `place_links`, `servo_forces` and `limited_forces`.
+    torque_limit : float
+        Infinite for none.
     """
-    for k in range(joints.shape[0] - 1):
-        ax, ay, bx, by = joints[k, 0], joints[k, 1], joints[k + 1, 0], joints[k + 1, 1]
-        best = reach * reach
-        if k < n_held - 1 or (k == n_held - 1 and bx <= 0.0):
-            distances[k] = reach
-            continue
-        if k == n_held - 1 and ax < 0.0:
-            ax, ay = 0.0, ay - ax * (by - ay) / (bx - ax)
-        margin = reach
-        low_x, high_x, low_y, high_y = min(ax, bx), max(ax, bx), min(ay, by), max(ay, by)
-        for w in range(walls.shape[0]):
-            cx, cy, dx, dy = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
-            if (
-                min(cx, dx) - high_x > margin
-                or low_x - max(cx, dx) > margin
-                or min(cy, dy) - high_y > margin
-                or low_y - max(cy, dy) > margin
-            ):
-                continue
-            if (
-                _cross(ax, ay, bx, by, cx, cy) * _cross(ax, ay, bx, by, dx, dy) < 0.0
-                and _cross(cx, cy, dx, dy, ax, ay) * _cross(cx, cy, dx, dy, bx, by) < 0.0
-            ):
-                best = 0.0
-                break
-            near = min(
-                min(_point_distance2(ax, ay, cx, cy, dx, dy), _point_distance2(bx, by, cx, cy, dx, dy)),
-                min(_point_distance2(cx, cy, ax, ay, bx, by), _point_distance2(dx, dy, ax, ay, bx, by)),
-            )
-            if near < best:
-                best = near
-                margin = math.sqrt(best)
-        distances[k] = math.sqrt(best)
+    place_links(target, link_length, poses, nodes)
+    feed_force = servo_forces(state, poses, link_length, timestep, n_held, forces, torques)
+    if np.abs(torques).max() > torque_limit:
+        feed_force = limited_forces(
+            state, last_target, target, link_length, timestep, torque_limit, n_held, forces, torques
+        )
+    effort[0] += feed_force
+    for k in range(torques.shape[0]):
+        effort[1 + k] += torques[k]
+
+
+@numba.njit(cache=True)
+def read_links(
+    numbers: FloatArray,
+    nodes: FloatArray,
+    link_length: float,
+    state: FloatArray,
+    joints: FloatArray,
+    tracking: FloatArray,
+) -> None:
+    """Take over the simulator's numbers, and compare the links with where they belong.
+
+    Parameters
+    ----------
+    numbers : array, shape (6 * n_links or more,)
+        Centre, heading, velocity and angular velocity of each link; more numbers are not looked at.
+    nodes : array, shape (n_links + 1, 2)
+        Where the joints belong.
+    state, joints : array, shape (n_links, 6) and (n_links + 1, 2)
+        Written: the numbers, and the joint positions as `deviation` has them.
+    tracking : array, shape (4,)
+        Raised to what is seen: node error and drift of this pose, then those since the reset; infinite if a
+        number is not finite.
+    """
+    n_links = state.shape[0]
+    for k in range(n_links):
+        for i in range(6):
+            state[k, i] = numbers[6 * k + i]
+    error, drift = deviation(state, nodes, link_length, joints)
+    if math.isnan(error):
+        error = drift = math.inf
+    for i in (0, 2):
+        tracking[i] = max(tracking[i], error)
+        tracking[i + 1] = max(tracking[i + 1], drift)

@@ -2,28 +2,60 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
+from collections import OrderedDict
+from dataclasses import dataclass
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hrsnake_env import task
 from hrsnake_env.arm import ArmSpec, FloatArray
-from hrsnake_env.contacts import Contact, PinchReport
-from hrsnake_env.dynamics import largest_move, step_targets
+from hrsnake_env.contacts import PinchReport
 from hrsnake_env.errors import InputError
-from hrsnake_env.geodesic import GeodesicDistance
+from hrsnake_env.geodesic import GeodesicDistance, look_ahead
 from hrsnake_env.maze import Maze
-from hrsnake_env.physics import CONTROL_TIMESTEP, Physics
-from hrsnake_env.rendering import MazePicture
+from hrsnake_env.observation import AHEAD, observation_space, write_observation
+from hrsnake_env.options import ResetOptions
+from hrsnake_env.physics import CONTROL_TIMESTEP, Physics, PhysicsState
+from hrsnake_env.random_mazes import LINK_LENGTH, N_LINKS, N_TASKS, task_maze
+from hrsnake_env.rendering import HEIGHT, Frame
+from hrsnake_env.tally import Tally
+from hrsnake_env.view import View
 
-__all__ = ["HyperRedundantMazeEnv"]
+__all__ = ["EnvState", "HyperRedundantMazeEnv"]
 
-RESET_OPTIONS = ("feed", "joint_angles")
+N_SCENES = 8
+"""So many mazes are kept ready, with their walls and distances."""
+
+NO_TASK = -1
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class EnvState:
+    """Hold where an episode stands, from `HyperRedundantMazeEnv.get_state`; it can be pickled."""
+
+    maze: Maze
+    task_id: int
+    target: FloatArray
+    physics: PhysicsState
+    tally: Tally
+    rng: dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Scene:
+    """Hold a maze with what is computed for it once."""
+
+    maze: Maze
+    distance: GeodesicDistance
+    way: float
+    physics: Physics
 
 
 class HyperRedundantMazeEnv(gym.Env[Any, Any]):
@@ -37,44 +69,99 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
 
     ## Action Space
 
-    `Box(-1, 1, (n_links + 1,), float32)`: the change of the feed's target in units of 0.02 link lengths, then
-    the change of each joint's target, base end first, in units of 0.05 rad (counter-clockwise positive).
-    Larger actions are cut. Joints that have not passed the base stay straight, whatever their action. If the
-    change would move any joint's place by more than 0.05 link lengths, all of it is scaled down to that.
+    `Box(-1, 1, (n_links + 1,), float32)`; larger actions are cut. Joints are counted from the base end,
+    angles are counter-clockwise positive.
+
+    | number      | with `action="delta"`                                   | with `action="absolute"`                                       |
+    |-------------|---------------------------------------------------------|----------------------------------------------------------------|
+    | 0           | change of the feed's target, in 0.02 link lengths       | the feed's target: -1 is none of the arm, 1 all of it          |
+    | 1 ... n_links | change of each joint's target, in 0.05 rad            | each joint's target, in shares of the joint limit (or of pi)   |
+
+    Absolute targets are approached by the changes that an action of 1 makes. Joints that have not passed the
+    base stay straight, whatever their action: their angle is cut to 16 rad per link length that they are past
+    it. If the change would move any joint's place by more than 0.05 link lengths, all of it is scaled down to
+    that. What a wall has refused is not asked for again: after a collision the targets are where the arm is.
 
     ## Observation Space
 
-    `Box(low, 1, (4 * n_links + 8,), float32)`; everything is cut to its bounds.
+    `observation="state"`: `Box(low, 1, (4 * n_links + 16,), float32)`; with `rays=True` 8 + 2 * n_links
+    numbers more. Everything is cut to its bounds. The reach is the length of the arm.
 
-    | part          | number      | meaning                                                      | min | max |
-    |---------------|-------------|--------------------------------------------------------------|-----|-----|
-    | feed          | 1           | length of arm past the base / length of the arm              | 0   | 1   |
-    | joint_angles  | n_links     | relative to the previous link / pi                           | -1  | 1   |
-    | target_errors | 1 + n_links | target minus feed and joint angles / largest change in a step| -1  | 1   |
-    | speeds        | 1 + n_links | of feed and joint angles / largest change in a step          | -1  | 1   |
-    | goal_offset   | 2           | x and y from the tip to the goal / size of the maze          | -1  | 1   |
-    | tip_heading   | 2           | cosine and sine                                              | -1  | 1   |
-    | goal_distance | 1           | from the tip round the walls / the same from the base, halved| 0   | 1   |
-    | clearances    | n_links     | of each link to the walls / link length                      | -1  | 1   |
+    | part          | number      | meaning                                                              | min | max |
+    |---------------|-------------|----------------------------------------------------------------------|-----|-----|
+    | feed          | 1           | length of arm past the base / reach                                  | 0   | 1   |
+    | joint_angles  | n_links     | relative to the previous link / joint limit (or pi)                  | -1  | 1   |
+    | target_errors | 1 + n_links | target minus feed and joint angles / largest change in a step        | -1  | 1   |
+    | speeds        | 1 + n_links | of feed and joint angles / largest change in a step                  | -1  | 1   |
+    | tip_position  | 2           | x and y from the base / reach                                        | -1  | 1   |
+    | tip_heading   | 2           | cosine and sine                                                      | -1  | 1   |
+    | clearances    | n_links     | of each link to the walls / link length                              | -1  | 1   |
+    | goal_offset   | 2           | x and y from the tip to the goal / reach                             | -1  | 1   |
+    | goal_distance | 1           | from the tip round the walls / the same from the base, halved        | 0   | 1   |
+    | ahead         | 6           | places 0.5, 1 and 2 link lengths ahead on the shortest way to the goal, forward and left of the tip, each / that length | -1  | 1   |
+    | tip_rays      | 8           | with `rays`: to the walls, from -105 to 105 degrees off the last link / 2 link lengths | 0   | 1   |
+    | side_rays     | 2 * n_links | with `rays`: to the right and the left of each joint / 2 link lengths; 1 in the feeder | 0   | 1   |
+
+    `observation="goal"`: a dictionary for hindsight replay. `observation` is the vector without goal_offset,
+    goal_distance and ahead, `achieved_goal` is tip_position and `desired_goal` the goal's place, scaled alike.
+
+    `observation="image"`: the picture of `render`, `Box(0, 255, (image_size, image_size, 3), uint8)`.
 
     ## Rewards
 
-    The sum of three terms, which `info` holds one by one: `reward_progress`, by how much the way from the tip
-    to the goal round the walls has become shorter, in link lengths; `reward_collision`, -1 in a step in which
-    a link has gone into a wall or another link; `reward_goal`, 10 on success.
+    The sum of three terms, which `info` holds one by one.
+
+    | term            | `reward_type="dense"`                                                      | `reward_type="sparse"` |
+    |-----------------|----------------------------------------------------------------------------|------------------------|
+    | reward_progress | by how much the way from the tip to the goal round the walls has become shorter, in link lengths, from -0.1 to 0.1 | 0 |
+    | reward_contact  | -0.2 (`contact_penalty`) in a step in which a link went deeper into a wall or another link than the pinch tolerance | the same |
+    | reward_goal     | 10 on success                                                              | 1 on success           |
+
+    With `observation="goal"` the reward must be a function of the two goals, `compute_reward`: there
+    reward_progress is minus the straight distance from the tip to the goal / reach (0 if sparse), and
+    reward_goal is 1 in every step with the tip at the goal.
 
     ## Starting State
 
-    The whole arm is in the feeder, at rest, with its tip at the base. `reset(options={"feed": ...,
-    "joint_angles": ...})` starts elsewhere.
+    The whole arm is in the feeder, at rest, with its tip at the base. `reset(options=...)` starts elsewhere:
+
+    | option         | meaning                                                                                    |
+    |----------------|--------------------------------------------------------------------------------------------|
+    | `maze`         | another maze for the same arm: a Maze, a name or a file                                    |
+    | `task_id`      | with `maze="random"`: which of the mazes of the split                                      |
+    | `goal`         | another goal (x, y), in maze units                                                         |
+    | `feed`         | length of arm past the base, in maze units                                                 |
+    | `joint_angles` | in rad, with `feed`                                                                        |
+    | `motion`       | anything with `feed` (n_poses,) and `joint_angles` (n_poses, n_links): start at a pose of it |
+    | `waypoint`     | which pose; by default the first                                                           |
+    | `state`        | from `get_state` or `snapshot`                                                             |
 
     ## Episode End
 
-    Termination: the tip is within the goal's radius (success); or a link has gone into something deeper than
-    the pinch tolerance (unless `terminate_on_collision=False`); or the arm is jammed, with a link's end 0.05
-    link lengths from where it belongs or joined links 0.01 apart.
+    Termination: the tip has been within the goal's radius for `success_hold_steps` steps (success); or a link
+    has gone into something deeper than the pinch tolerance (unless `terminate_on_collision=False`); or the arm
+    is jammed, with a link's end 0.1 link lengths from where it belongs or joined links 0.02 apart.
 
-    Truncation: after 10,000 steps, by the time limit of the registration.
+    Truncation: by the time limit of the registration, 10,000 steps for `HyperRedundantMaze-v0`.
+
+    ## Info
+
+    The same keys from the reset on. Lengths are in maze units.
+
+    | key                                  | meaning                                                                |
+    |--------------------------------------|------------------------------------------------------------------------|
+    | success, is_success                  | whether the episode has ended in success                               |
+    | progress                             | share of the way to the goal that is done                              |
+    | feed, tip_distance, goal_distance    | length of arm past the base; tip to goal, straight and round the walls |
+    | clearance                            | smallest of all links, negative in a wall                              |
+    | pinches, collisions                  | links that did so in this step                                         |
+    | depth, impulse                       | largest in this step; impulse in link mass x link length / s           |
+    | joint_torques                        | mean of the step, shape (n_links,), in link mass x link length^2 / s^2 |
+    | node_error, drift                    | how far a link's end is from its place, and joined links apart         |
+    | task_id                              | which random maze, or -1                                               |
+    | reward_progress, reward_contact, reward_goal | the terms of the reward                                        |
+    | total_steps, total_reward, total_pinches, total_collisions | sums since the reset                             |
+    | worst_depth, worst_impulse           | largest since the reset                                                |
 
     ## Arguments
 
@@ -85,13 +172,37 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
     Parameters
     ----------
     maze : Maze, str or path
-        A maze, the name of one, or a maze file.
+        A maze, the name of one, or a maze file; "random" for a new one at every reset.
     link_length : float, optional
-        In maze units. By default one and a half times the mean width of the maze.
+        In maze units. By default one and a half times the mean width of the maze; 100 for random mazes.
     n_links : int, optional
-        By default enough to reach the goal.
+        By default enough to reach the goal; 12 for random mazes.
     link_radius : float
         In maze units; 0 means that links are line segments, as in the paper.
+    joint_limit : float, optional
+        Largest joint angle in rad; None means no limit.
+    observation : {"state", "goal", "image"}
+        What is observed.
+    rays : bool
+        Whether rays from the tip and to the sides of the joints are observed.
+    image_size : int
+        Side of an observed picture, in pixels.
+    action : {"delta", "absolute"}
+        What an action means.
+    reward_type : {"dense", "sparse"}
+        What is rewarded.
+    contact_penalty : float
+        For a step with a collision.
+    goal_radius : float, optional
+        In maze units; by default the maze's.
+    success_hold_steps : int
+        So many steps in a row the tip must be at the goal.
+    terminate_on_collision : bool
+        Whether a collision ends the episode.
+    split : {"train", "test"}
+        Which random mazes; no maze is in both.
+    difficulty : tuple of two floats
+        Range of the random mazes' difficulty, within [0, 1].
     substeps : int
         Simulated steps in one step of the environment.
     torque_limit : float, optional
@@ -100,10 +211,8 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         "gear": a servo in each joint turns its link to the target, and nothing else pushes the links. Walls
         then hardly push back: a link sinks into a wall by about 90 % of what it is sent. Use it to see what
         joint servos alone do; `torque_limit` must be None.
-    terminate_on_collision : bool
-        Whether a collision ends the episode.
-    render_mode : {None, "rgb_array"}
-        "rgb_array" needs no display.
+    render_mode : {None, "human", "rgb_array"}
+        "human" shows every step in a window (`pip install "hrsnake[play]"`); "rgb_array" needs no display.
 
     Raises
     ------
@@ -116,7 +225,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
-        "render_modes": ["rgb_array"],
+        "render_modes": ["human", "rgb_array"],
         "render_fps": round(1 / CONTROL_TIMESTEP),
     }
 
@@ -126,163 +235,453 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         link_length: float | None = None,
         n_links: int | None = None,
         link_radius: float = 0.0,
+        joint_limit: float | None = None,
+        observation: str = "state",
+        rays: bool = False,
+        image_size: int = 96,
+        action: str = "delta",
+        reward_type: str = "dense",
+        contact_penalty: float = task.CONTACT_PENALTY,
+        goal_radius: float | None = None,
+        success_hold_steps: int = 1,
+        terminate_on_collision: bool = True,
+        split: str = "train",
+        difficulty: tuple[float, float] = (0.0, 1.0),
         substeps: int = 4,
         torque_limit: float | None = None,
         actuation: str = "computed_torque",
-        terminate_on_collision: bool = True,
         render_mode: str | None = None,
     ) -> None:
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise InputError(f"Unknown render_mode {render_mode!r}. Available: None, 'rgb_array'.")
-        self.maze = maze if isinstance(maze, Maze) else Maze.load(maze)
-        self._goal_distance = GeodesicDistance(self.maze)
-        self._way = self._goal_distance(self.maze.base_pose[:2])
+        _check_one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
+        _check_one_of("action", action, task.ACTIONS)
+        _check_one_of("reward_type", reward_type, task.REWARDS)
+        _check_one_of("split", split, tuple(N_TASKS))
+        _check_at_least("contact_penalty", contact_penalty, 0.0)
+        _check_at_least("success_hold_steps", success_hold_steps, 1, whole=True)
+        _check_at_least("image_size", image_size, 16, whole=True)
+        if goal_radius is not None and not (_is_number(goal_radius) and 0.0 < goal_radius < math.inf):
+            raise InputError(f"Expected a positive, finite goal_radius, or None, got {goal_radius!r}.")
+        self._random: dict[str, Any] | None = None
+        if isinstance(maze, str) and maze == "random":
+            link_length = LINK_LENGTH if link_length is None else link_length
+            n_links = N_LINKS if n_links is None else n_links
+            low, high = difficulty
+            self._random = {
+                "difficulty": (float(low), float(high)),
+                "link_length": link_length,
+                "n_links": n_links,
+            }
+            maze = task_maze(split, 0, **self._random)
+        self._split, self._goal_radius = split, goal_radius
+        self._physics_options = {
+            "substeps": substeps,
+            "torque_limit": torque_limit,
+            "actuation": actuation,
+        }
+        first = self._with_goal(maze if isinstance(maze, Maze) else Maze.load(maze), None)
+        distance = GeodesicDistance(first)
         if link_length is None:
-            link_length = 1.5 * _mean_width(self.maze)
-        arm = ArmSpec(link_length=link_length, n_links=n_links, link_radius=link_radius)
-        self.maze.check_arm(arm)
+            link_length = 1.5 * _mean_width(first)
+        arm = ArmSpec(
+            link_length=link_length, n_links=n_links, link_radius=link_radius, joint_limit=joint_limit
+        )
+        first.check_arm(arm)
         if n_links is None:
             # A link more than a way 5 % longer takes: links cut corners less well than a string.
-            n_links = math.ceil(1.05 * self._way / link_length) + 1
-        self.arm = ArmSpec(link_length=link_length, n_links=n_links, link_radius=link_radius)
-        self.physics = Physics(
-            self.maze, self.arm, substeps=substeps, torque_limit=torque_limit, actuation=actuation
-        )
+            n_links = math.ceil(1.05 * distance(first.base_pose[:2]) / link_length) + 1
+        self.arm = dataclasses.replace(arm, n_links=n_links)
         self.render_mode = render_mode
         self.action_space = spaces.Box(-1.0, 1.0, (n_links + 1,), np.float32)
-        self.observation_space = task.observation_space(n_links)
+        self.observation_space = observation_space(observation, n_links, rays=rays, image_size=image_size)
+        if observation == "goal":
+            self.compute_reward = self.goal_reward  # its presence says that there is a goal
+        self._mode, self._rays, self._image_size = observation, rays, image_size
+        self.action_mode = action
+        self._absolute, self._reward_type, self._contact_penalty = (
+            action == "absolute",
+            reward_type,
+            contact_penalty,
+        )
+        self._success_hold_steps = success_hold_steps
         self._terminate_on_collision = terminate_on_collision
-        self._step_limits = np.array([task.FEED_STEP * link_length, *([task.JOINT_STEP] * n_links)])
-        self._picture: MazePicture | None = None
-        self._distance = self._way
+        self._joint_limit = math.pi if joint_limit is None else joint_limit
+        self._reach = n_links * link_length
+        self._scales = np.array(
+            [link_length, task.FEED_STEP * link_length, task.JOINT_STEP, self._joint_limit]
+        )
+        self._ahead = np.array(AHEAD) * link_length
+        self._target, self._wanted = np.zeros(1 + n_links), np.zeros(1 + n_links)
+        self._no_rays, self._places = np.zeros(0), np.zeros((len(AHEAD), 2))
+        size = (HEIGHT, HEIGHT) if self._random else None
+        self._view = View(size, fps=self.metadata["render_fps"])
+        self._eye = View((image_size, image_size), fps=self.metadata["render_fps"])
+        self._scenes: OrderedDict[Maze, _Scene] = OrderedDict()
+        self._task_id = NO_TASK if self._random is None else 0
+        self._first_maze = first
+        self._enter(first, distance)
         self._start(0.0, np.zeros(n_links))
 
     # The Gymnasium interface
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start an episode; `options` may hold `feed` (maze units) and `joint_angles` (rad) to start from."""
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start an episode.
+
+        Parameters
+        ----------
+        seed : int, optional
+            For `np_random`, from which random mazes are drawn.
+        options : dict, optional
+            `maze` (a Maze, a name or a file; for the same arm), `task_id` (which random maze), `goal` (x, y),
+            `feed` and `joint_angles` (maze units and rad), `motion` and `waypoint` (start at that pose of
+            anything with `feed`, shape (n_poses,), and `joint_angles`, shape (n_poses, n_links)), or `state`
+            (from `get_state`; the random numbers go on as they are).
+
+        Raises
+        ------
+        InputError
+            If an option is unknown, or an arm cannot start so: out of what the feeder allows, in a wall,
+            across itself, or with its tip at the goal.
+        """
         super().reset(seed=seed)
-        options = options or {}
-        unknown = [key for key in options if key not in RESET_OPTIONS]
-        if unknown:
-            raise InputError(f"Unknown reset option {unknown[0]!r}. Available: {', '.join(RESET_OPTIONS)}.")
-        self._start(options.get("feed", 0.0), options.get("joint_angles", np.zeros(self.physics.n_links)))
-        outcome = task.StepOutcome(progress=0.0, collided=False, succeeded=False)
-        return self._observation(), self._info(outcome, ())
+        wanted = ResetOptions.parse(options, self.arm)
+        if wanted.state is not None:
+            self._return_to(wanted.state)
+        else:
+            maze = self._wanted_maze(wanted)
+            self._enter(maze)
+            self._start(wanted.feed, wanted.joint_angles)
+        if self.render_mode == "human":
+            self.render()
+        return self.observe(), self._info()
 
-    def step(
-        self, action: NDArray[np.floating[Any]]
-    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Change the targets by an action, and simulate until the arm is there (see the class)."""
-        self._target = self._next_target(self._checked(action))
-        self.physics.advance(self._target[0], self._target[1:])
-        before, self._distance = self._distance, self._distance_now()
-        contacts = self.physics.pose_contacts
-        collided = any(contact.kind == "collision" for contact in contacts)
-        jammed = task.is_jammed(self.physics)
-        failed = jammed or (collided and self._terminate_on_collision)
-        outcome = task.StepOutcome(
-            progress=(before - self._distance) / self.arm.link_length,
-            collided=collided,
-            succeeded=not failed and self._tip_distance() <= self.maze.goal_radius,
+    def step(self, action: NDArray[np.floating[Any]]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Change the targets by an action, and simulate until the arm is there (see the class).
+
+        Raises
+        ------
+        InputError
+            If the action has another shape, or is not finite; nothing has happened then.
+        """
+        # A finer action than float32 keeps its digits.
+        values = np.asarray(action, dtype=np.float64)
+        if values.shape != self._target.shape:
+            raise InputError(f"Expected an action with shape {self._target.shape}, got {values.shape}.")
+        if self._tally.collided:
+            # What a wall has refused is not asked for again, or the arm would wind up and jam.
+            self.physics.take_back()
+            self._target[:] = self.physics.target
+        bad = task.next_target(
+            self._target, values, self._absolute, self.arm.link_length, self._joint_limit, self._wanted
         )
-        info = self._info(outcome, contacts)
-        reward = sum(task.reward_terms(outcome).values())
-        return self._observation(), reward, failed or outcome.succeeded, False, info
+        if bad >= 0:
+            raise InputError(f"Expected a finite action, got {values[bad]} at index {bad}.")
+        self._target, self._wanted = self._wanted, self._target
+        self.physics.advance(self._target[0], self._target[1:])
+        terminated, reward = self._judge()
+        if self.render_mode == "human":
+            self.render()
+        return self.observe(), reward, terminated, False, self._info()
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """Return a picture of the arm in the maze, shape (height, width, 3); None without a render mode."""
+    def render(self) -> Frame | None:
+        """Draw the arm in the maze, its links coloured by clearance, and what touches.
+
+        Returns
+        -------
+        frame : uint8 array, shape (height, width, 3), or None
+            None in the mode "human", which shows the frame in a window, and without a render mode.
+        """
         if self.render_mode is None:
             gym.logger.warn(
                 'Calling render() without a render mode; pass render_mode="rgb_array" to gym.make.'
             )
             return None
-        if self._picture is None:
-            self._picture = MazePicture(self.maze)
-        touching = self.physics.pose_contacts
-        self._picture.draw_arm(
-            self.physics.joints,
-            pinched={contact.link for contact in touching if contact.kind == "pinch"},
-            collided={contact.link for contact in touching if contact.kind == "collision"},
+        if self.render_mode == "rgb_array":
+            return self._view.frame(self.physics)
+        self._view.show(self.physics)
+        return None
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._view.close()
+
+    def observe(self) -> Any:
+        """Return the present observation, as the last `reset` or `step` has."""
+        if self._mode == "image":
+            return self._eye.frame(self.physics)
+        physics, goal = self.physics, self._mode == "state"
+        senses = physics.sense()
+        shape = self.observation_space if goal else self.observation_space["observation"]  # type: ignore[index]
+        vector = np.empty(shape.shape, dtype=np.float32)  # type: ignore[arg-type]
+        write_observation(
+            *senses,
+            self._target,
+            self._scales,
+            self.maze.base_pose,
+            goal,
+            self.maze.goal,
+            self._tally.distance / (2.0 * self._scene.way),
+            self._places,
+            physics.cast_rays() if self._rays else self._no_rays,
+            vector,
         )
-        return self._picture.rgb()
+        if goal:
+            return vector
+        return {
+            "observation": vector,
+            "achieved_goal": self._goal_place(senses.readings[1:3]),
+            "desired_goal": self._goal_place(self.maze.goal),
+        }
+
+    def goal_reward(
+        self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Any
+    ) -> float | NDArray[np.float64]:
+        """Return the reward of the mode "goal", of one transition or of many: `env.compute_reward` there.
+
+        Parameters
+        ----------
+        achieved_goal, desired_goal : array-like, shape (2,) or (n, 2)
+            As the observations have them.
+        info : dict, or sequence of n dicts
+            Of the transitions; without "collisions" in it, there were none.
+
+        Returns
+        -------
+        reward : float, or array with shape (n,)
+        """
+        terms = self._goal_terms(achieved_goal, desired_goal, info)
+        reward = sum(terms.values())
+        return float(reward) if np.ndim(reward) == 0 else np.asarray(reward, dtype=np.float64)
 
     def pinch_report(self) -> PinchReport:
         """Return whether links have merely pinched the walls since the reset, and where they collided."""
         return self.physics.report()
 
     @property
+    def physics(self) -> Physics:
+        """The simulator."""
+        return self._scene.physics
+
+    @property
+    def maze(self) -> Maze:
+        """The maze of this episode."""
+        return self._scene.maze
+
+    @property
     def target(self) -> FloatArray:
         """Where feed and joint angles were last sent, shape (1 + n_links,), in maze units and rad."""
         return self._target.copy()
 
+    # Saving and restoring
+
+    def get_state(self) -> EnvState:
+        """Return where the episode stands, without disturbing it; it goes on from there to the last bit.
+
+        The state holds all moves since the reset, or the last `snapshot`, and going back to it repeats them.
+        What wrappers count, such as the steps of a time limit, is not in it.
+        """
+        return self._state(self.physics.get_state())
+
+    def snapshot(self) -> EnvState:
+        """Return a state that is quick to go back to, for searching from it.
+
+        The simulator is built afresh at once, and so the episode may go on differently in the last digits
+        than without: but always as it does after `set_state`.
+        """
+        return self._state(self.physics.snapshot())
+
+    def set_state(self, state: EnvState) -> None:
+        """Go back to a state of this environment, or of one made alike, random numbers included."""
+        self._return_to(state)
+        self.np_random.bit_generator.state = state.rng
+
+    def _state(self, physics: PhysicsState) -> EnvState:
+        return EnvState(
+            maze=self.maze,
+            task_id=self._task_id,
+            target=self._target.copy(),
+            physics=physics,
+            tally=self._tally.copy(),
+            rng=self.np_random.bit_generator.state,  # type: ignore[arg-type]
+        )
+
+    def _return_to(self, state: Any) -> None:
+        if not isinstance(state, EnvState):
+            raise InputError(f"Expected a state from get_state or snapshot, got {type(state).__name__}.")
+        self._enter(state.maze)
+        self.physics.set_state(state.physics)
+        self._task_id = state.task_id
+        self._target = state.target.copy()
+        self._look_ahead()
+        self._tally = state.tally.copy()
+
     # What it is made of
 
-    def _start(self, feed: float, joint_angles: Any) -> None:
-        self.physics.reset(feed, joint_angles)
-        self._target = self.physics.target
-        self._distance = self._way
-        self._distance = self._distance_now()
+    def _with_goal(self, maze: Maze, goal: FloatArray | None) -> Maze:
+        """Return a maze with the goal that is asked for."""
+        changes: dict[str, Any] = {} if goal is None else {"goal": goal}
+        if self._goal_radius is not None:
+            changes["goal_radius"] = self._goal_radius
+        return dataclasses.replace(maze, **changes) if changes else maze
 
-    def _checked(self, action: Any) -> FloatArray:
-        """Return an action as float64, cut to [-1, 1]: a finer action than float32 keeps its digits."""
-        values = np.asarray(action, dtype=np.float64)
-        if values.shape != self.action_space.shape:
-            raise InputError(f"Expected an action with shape {self.action_space.shape}, got {values.shape}.")
-        if not np.isfinite(values).all():
-            k = int(np.flatnonzero(~np.isfinite(values))[0])
-            raise InputError(f"Expected a finite action, got {values[k]} at index {k}.")
-        return np.clip(values, -1.0, 1.0)
+    def _wanted_maze(self, wanted: ResetOptions) -> Maze:
+        if wanted.task_id is not None and self._random is None:
+            raise InputError("Expected maze='random' for the reset option 'task_id', got another maze.")
+        maze, self._task_id = wanted.maze_given(), NO_TASK
+        if maze is None and self._random is not None:
+            n_tasks = N_TASKS[self._split]
+            task_id = int(self.np_random.integers(n_tasks)) if wanted.task_id is None else wanted.task_id
+            self._task_id, maze = task_id, task_maze(self._split, task_id, **self._random)
+        if maze is None:
+            maze = self._first_maze
+            return maze if wanted.goal is None else self._with_goal(maze, wanted.goal)
+        return self._with_goal(maze, wanted.goal)
 
-    def _next_target(self, action: FloatArray) -> FloatArray:
-        """Return the target after an action, scaled down until no joint's place moves too far."""
-        change, largest = action * self._step_limits, task.LARGEST_STEP * self.arm.link_length
-        for _ in range(20):
-            wanted = self._target + change
-            wanted[0] = min(max(wanted[0], 0.0), self.physics.n_links * self.arm.link_length)
-            targets: FloatArray = np.empty((1, len(wanted)))
-            step_targets(self._target, wanted, self.arm.link_length, targets)  # straight in the feeder
-            move = largest_move(self._target, targets, self.arm.link_length)
-            if move <= largest * (1.0 + 1e-6):
-                break
-            change *= largest / move
+    def _enter(self, maze: Maze, distance: GeodesicDistance | None = None) -> None:
+        """Make a maze the present one; its walls and distances are computed when it is new."""
+        scene = self._scenes.get(maze)
+        if scene is None:
+            maze.check_arm(self.arm)
+            distance = distance or GeodesicDistance(maze)
+            scene = _Scene(
+                maze=maze,
+                distance=distance,
+                way=distance(maze.base_pose[:2]),
+                physics=Physics(maze, self.arm, **self._physics_options),
+            )
+            self._scenes[maze] = scene
+            if len(self._scenes) > N_SCENES:
+                self._scenes.popitem(last=False)
+        self._scenes.move_to_end(maze)
+        self._scene = scene
+        self._goal = (float(maze.goal[0]), float(maze.goal[1]))
+
+    def _start(self, feed: float, joint_angles: FloatArray) -> None:
+        physics = self.physics
+        physics.reset(feed, joint_angles)
+        self._target[:] = physics.target
+        self._tally = Tally(distance=self._scene.way)
+        self._tally.distance = self._look_ahead()
+        if feed > 0.0:
+            self._check_start()
+
+    def _check_start(self) -> None:
+        """Refuse a start in a wall, across itself, or at the goal."""
+        self.physics.settle()  # lets the simulator see what touches
+        for contact in self.physics.pose_contacts:
+            if contact.kind == "collision":
+                what = "a wall" if contact.other is None else f"link {contact.other}"
+                raise InputError(
+                    f"Expected a start clear of the walls, got link {contact.link} {-contact.clearance:.3g} "
+                    f"{self.maze.units} deep in {what} at ({contact.point[0]:g}, {contact.point[1]:g})."
+                )
+        if self._tip_distance() <= self.maze.goal_radius:
+            raise InputError("Expected a start outside the goal's radius, got one with the tip at the goal.")
+        self._tally.see(self.physics.pose_contacts)
+
+    def _judge(self) -> tuple[bool, float]:
+        """Return whether the step has ended the episode, and its reward."""
+        tally, physics, length = self._tally, self.physics, self.arm.link_length
+        tally.see(physics.pose_contacts)
+        before, tally.distance = tally.distance, self._look_ahead()
+        jammed = (
+            not physics.finite
+            or physics.node_error > task.JAM_NODE_ERROR * length
+            or physics.drift > task.JAM_DRIFT * length
+        )
+        failed = jammed or (tally.collided and self._terminate_on_collision)
+        at_goal = not failed and self._tip_distance() <= self.maze.goal_radius
+        tally.steps_at_goal = tally.steps_at_goal + 1 if at_goal else 0
+        tally.succeeded = tally.steps_at_goal >= self._success_hold_steps
+        if self._mode == "goal":
+            place, goal = self._goal_place(physics.sense().readings[1:3]), self._goal_place(self.maze.goal)
+            terms = self._goal_terms(place, goal, {"collisions": tally.collisions})
+            terms = {name: float(value) for name, value in terms.items()}
         else:
-            return self._target
-        return np.ascontiguousarray(targets[0])
+            terms = task.reward_terms(
+                self._reward_type,
+                progress=(before - tally.distance) / length,
+                collided=tally.collided,
+                succeeded=tally.succeeded,
+                contact_penalty=self._contact_penalty,
+            )
+        return failed or tally.succeeded, tally.reward(terms)
+
+    def _goal_place(self, point: FloatArray) -> NDArray[np.float32]:
+        """Return a place relative to the base, as a share of the arm's length."""
+        place = (point - self.maze.base_pose[:2]) / self._reach
+        return np.clip(np.nan_to_num(place), -1.0, 1.0).astype(np.float32)
+
+    def _goal_terms(self, achieved: ArrayLike, desired: ArrayLike, info: Any) -> dict[str, Any]:
+        offset = np.asarray(achieved, dtype=np.float64) - np.asarray(desired, dtype=np.float64)
+        infos = [info] if isinstance(info, dict) else list(info)
+        collided = np.array([entry.get("collisions", 0) > 0 for entry in infos])
+        return task.goal_reward_terms(
+            self._reward_type,
+            distance=np.linalg.norm(offset, axis=-1),
+            goal_radius=self.maze.goal_radius / self._reach,
+            collided=collided[0] if isinstance(info, dict) else collided,
+            contact_penalty=self._contact_penalty,
+        )
 
     def _tip_distance(self) -> float:
-        return float(np.linalg.norm(self.physics.tip_position - self.maze.goal))
+        readings, goal = self.physics.sense().readings.tolist(), self._goal
+        return math.hypot(readings[1] - goal[0], readings[2] - goal[1])
 
-    def _distance_now(self) -> float:
-        """Return the way from the tip to the goal; with the tip in a wall, what it was before."""
-        distance = self._goal_distance(self.physics.tip_position) if self.physics.finite else math.inf
-        return distance if math.isfinite(distance) else self._distance
+    def _look_ahead(self) -> float:
+        """Return the way from the tip to the goal; with the tip deep in a wall, what it was before."""
+        distance = math.inf
+        if self.physics.finite:
+            _, x, y, *_ = self.physics.sense().readings.tolist()
+            distance = look_ahead(self._scene.distance.ways, x, y, self._ahead, self._places)
+        return distance if math.isfinite(distance) else self._tally.distance
 
-    def _observation(self) -> NDArray[np.float32]:
-        return task.observation(self.physics, self._target, min(self._distance / (2.0 * self._way), 1.0))
-
-    def _info(self, outcome: task.StepOutcome, contacts: tuple[Contact, ...]) -> dict[str, Any]:
+    def _info(self) -> dict[str, Any]:
+        tally, physics = self._tally, self.physics
+        readings = physics.sense().readings
         return {
-            "success": outcome.succeeded,
-            "is_success": outcome.succeeded,
-            "feed": self.physics.feed,
+            "success": tally.succeeded,
+            "is_success": tally.succeeded,
+            "progress": 1.0 - tally.distance / self._scene.way,
+            "feed": float(readings[0]),
             "tip_distance": self._tip_distance(),
-            "goal_distance": self._distance,
-            "clearance": float(self.physics.clearance.min()),
-            "pinches": len({contact.link for contact in contacts if contact.kind == "pinch"}),
-            "collisions": len({contact.link for contact in contacts if contact.kind == "collision"}),
-            "depth": max(
-                (-contact.clearance for contact in contacts if contact.clearance < 0.0), default=0.0
-            ),
-            "impulse": max((contact.impulse for contact in contacts), default=0.0),
-            "node_error": self.physics.node_error,
-            "drift": self.physics.drift,
-            **task.reward_terms(outcome),
+            "goal_distance": tally.distance,
+            "clearance": float(readings[5]),
+            "pinches": tally.pinches,
+            "collisions": tally.collisions,
+            "depth": tally.depth,
+            "impulse": tally.impulse,
+            "joint_torques": physics.torques,
+            "node_error": physics.node_error,
+            "drift": physics.drift,
+            "task_id": self._task_id,
+            **tally.terms,
+            "total_steps": tally.steps,
+            "total_reward": tally.total_reward,
+            "total_pinches": tally.total_pinches,
+            "total_collisions": tally.total_collisions,
+            "worst_depth": tally.worst_depth,
+            "worst_impulse": tally.worst_impulse,
         }
 
 
 def _mean_width(maze: Maze) -> float:
     """Return the width of the corridor that has the maze's area and length of walls."""
     return float(2.0 * maze.free_space.area / maze.free_space.length)
+
+
+def _check_one_of(what: str, value: Any, available: tuple[Any, ...]) -> None:
+    if value not in available:
+        raise InputError(f"Unknown {what} {value!r}. Available: {', '.join(map(repr, available))}.")
+
+
+def _check_at_least(what: str, value: Any, least: float, *, whole: bool = False) -> None:
+    right = isinstance(value, int | np.integer) if whole else _is_number(value)
+    if isinstance(value, bool) or not right or not (least <= value < math.inf):
+        kind = "a whole number" if whole else "a finite number"
+        raise InputError(f"Expected {what} to be {kind} of at least {least:g}, got {value!r}.")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 import pymunk
@@ -13,27 +15,25 @@ from numpy.typing import ArrayLike
 from hrsnake_env.actuation import ACTUATIONS, aim_gears, placed_chain
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.contacts import PINCH_TOLERANCE, Contact, ContactLog, PinchReport, pinch_report
-from hrsnake_env.dynamics import (
-    deviation,
-    largest_move,
-    limited_forces,
-    link_distances,
-    place_links,
-    servo_forces,
-    step_targets,
-)
+from hrsnake_env.dynamics import divide, drive, place_links, read_links, step_targets
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
+from hrsnake_env.sensing import N_READINGS, N_TIP_RAYS, Senses, cast_rays, read_arm
 from hrsnake_env.space import SIM_LINK, TOLERANCE, ArmSpace
-from hrsnake_env.walls import Frame, wall_pieces
+from hrsnake_env.walls import Frame, has_thin_walls, wall_pieces
 
-__all__ = ["CONTROL_TIMESTEP", "Physics", "simulate"]
+__all__ = ["CONTROL_TIMESTEP", "RAY_REACH", "Physics", "PhysicsState", "simulate"]
 
 CONTROL_TIMESTEP = 0.05
 """In s: the time from one pose to the next."""
 
-LARGEST_MOVE = 0.013
-"""In link lengths: no joint moves farther in one substep, so that no wall of 0.011 is jumped unseen."""
+THICK_MOVE = 0.052
+THIN_MOVE = 0.013
+"""In link lengths: no joint moves farther in one substep, so that no wall is jumped unseen; the second among
+walls thinner than the thickest solid layer, of which any of 0.011 is met."""
+
+RAY_REACH = 2.0
+"""Length of the longest rays, in link lengths."""
 
 SLOT_TOLERANCES = 4.0
 """The walls are open for the feeder by so many pinch tolerances more than a link is wide, on each side."""
@@ -49,6 +49,43 @@ STATE = (
 )
 POSES = pymunk.batch.BodyFields.POSITION | pymunk.batch.BodyFields.ANGLE
 FORCES = pymunk.batch.BodyFields.FORCE | pymunk.batch.BodyFields.TORQUE
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Start:
+    """Hold a simulation whose solver remembers nothing: of a reset, or of a canonical snapshot.
+
+    In simulator units; `n_active` links have been in the maze in this pose, and `past_link_poses` counts
+    those of the poses before.
+    """
+
+    links: FloatArray
+    target: FloatArray
+    last_target: FloatArray
+    touched: FloatArray
+    effort: FloatArray
+    n_efforts: int
+    tracking: FloatArray
+    pose: int
+    n_held: int
+    n_active: int
+    past_link_poses: int
+    log: ContactLog
+
+
+Move = tuple[Literal["advance", "take_back", "settle"], FloatArray | None]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PhysicsState:
+    """Hold where a simulation stands, for `Physics.set_state`: where it started, and every move since.
+
+    The solver remembers impulses that pymunk does not tell of, so a state repeats the moves since the reset,
+    or since the last `Physics.snapshot`, and so is exact to the last bit.
+    """
+
+    start: _Start
+    moves: tuple[Move, ...]
 
 
 class Physics:
@@ -116,23 +153,24 @@ class Physics:
         self._surface = np.array(
             [(*piece.start, *piece.end) for piece in self._pieces if piece.radius == 0.0]
         )
+        self._largest_move = SIM_LINK * (THIN_MOVE if has_thin_walls(self._pieces, SIM_LINK) else THICK_MOVE)
         self._allocate()
         self.reset()
 
     def _allocate(self) -> None:
         n = self.n_links
         self._targets = np.zeros((self.substeps, 1 + n))
+        self._target, self._last_target = np.zeros(1 + n), np.zeros(1 + n)
         self._all_poses = np.zeros((n + N_STATIC, 3))
         self._poses = self._all_poses[:n]
         self._nodes, self._last_nodes, self._sim_joints = (np.zeros((n + 1, 2)) for _ in range(3))
         # pymunk's batches hold static bodies as well, after the links; short of numbers, it takes what comes
         # next in memory.
         self._state, self._forces = np.zeros((n, 6)), np.zeros((n + N_STATIC, 3))
-        self._clearance: FloatArray | None = None
-        self._torques, self._distances = np.zeros(n), np.zeros(n)
-        self._effort = np.zeros(1 + n)
-        self._n_efforts = 0
-        self._node_error = self._drift = self._feed_force = 0.0
+        self._torques, self._effort, self._tracking = np.zeros(n), np.zeros(1 + n), np.zeros(4)
+        self._frame_numbers = np.array([*self._frame.base_pose, self._scale])
+        self._senses = Senses(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(N_READINGS))
+        self._rays = np.zeros(N_TIP_RAYS + 2 * n)
         self._reader, self._writer = pymunk.batch.Buffer(), pymunk.batch.Buffer()
         self._writer.set_float_buf((self._all_poses if self.kinematic else self._forces).reshape(-1))
 
@@ -152,30 +190,57 @@ class Physics:
         """
         angles = np.zeros(self.n_links) if joint_angles is None else joint_angles
         target = self._as_target(feed, angles)
-        self._target = self._divided(target, target)[-1].copy()
-        self._last_target = self._target.copy()
-        self._log = ContactLog(PINCH_TOLERANCE * self.link_length)
-        self._n_held, self._past_link_poses, self._active = self.n_links, 0, 0
-        self._worst_node_error = self._worst_drift = self._feed_force = 0.0
-        place_links(self._target, SIM_LINK, self._poses, self._nodes)
+        step_targets(target, target, SIM_LINK, self._targets)
+        target = self._targets[-1].copy()
+        links = np.zeros((self.n_links, 6))
+        place_links(target, SIM_LINK, self._poses, self._nodes)
+        links[:, :3] = self._poses
+        n_held = self._held(target[0])
+        self._begin(
+            _Start(
+                links=links,
+                target=target,
+                last_target=target,
+                touched=np.full(self.n_links, math.inf),
+                effort=np.zeros(1 + self.n_links),
+                n_efforts=0,
+                tracking=np.zeros(4),
+                pose=0,
+                n_held=n_held,
+                n_active=self.n_links - max(n_held - 1, 0),
+                past_link_poses=0,
+                log=ContactLog(PINCH_TOLERANCE * self.link_length),
+            )
+        )
+        self._check_order()
+        if self.kinematic:
+            self._substep(0, target)
+
+    def _begin(self, start: _Start) -> None:
+        """Build the simulator afresh, and put the arm where it starts."""
+        self._start, self._moves = start, list[Move]()
+        self._target[:], self._last_target[:], self._effort[:] = start.target, start.last_target, start.effort
+        self._n_efforts, self._n_held, self.pose = start.n_efforts, start.n_held, start.pose
+        self._n_active, self._past_link_poses = start.n_active, start.past_link_poses
+        self._log = start.log.copy()
+        place_links(start.target, SIM_LINK, self._poses, self._nodes)
         self._last_nodes[:] = self._nodes
         build = placed_chain if self.kinematic else ACTUATIONS[self._actuation]
         self._chain = build(self.n_links, SIM_LINK)
         self._space = ArmSpace(
             self._pieces,
             self._chain,
-            self._poses,
+            start.links,
             self._radius,
             log=self._log,
             frame=self._frame,
             walls=self.maze.walls,
         )
-        self._begin_pose(0)
+        self._space.clearances[:] = start.touched
+        self._space.n_held = start.n_held
+        self._space.activate_links(max(start.n_held - 1, 0))
         self._read()
-        self._check_order()
-        self._feed_links(self._target[0])
-        if self.kinematic:
-            self._substep(0, self._target)
+        self._tracking[:] = start.tracking
 
     def advance(self, feed: float, joint_angles: ArrayLike) -> None:
         """Move on to the next pose; in between the targets change linearly.
@@ -189,108 +254,168 @@ class Physics:
         joint_angles : array-like, shape (n_links,)
             In rad.
         """
-        end = self._as_target(feed, joint_angles)
-        targets = self._divided(self._target, end)
-        self._begin_pose(self.pose + 1)
-        for number, target in enumerate(targets):
-            self._substep(number, target)
-        self._target[:] = targets[-1]
+        self._move("advance", self._as_target(feed, joint_angles))
+
+    def take_back(self) -> None:
+        """Take the targets back to where the arm is: what walls have refused is forgotten."""
+        self._move("take_back", None)
 
     def settle(self) -> None:
         """Take one more substep, so that the links arrive where they were last sent."""
-        if not self.kinematic:
-            self._substep(self.substeps, self._target)
+        self._move("settle", None)
 
-    def _divided(self, start: FloatArray, end: FloatArray) -> FloatArray:
-        """Divide a change of configuration so that no link jumps a wall, shape (substeps, 1 + n_links)."""
+    def _move(self, kind: Literal["advance", "take_back", "settle"], end: FloatArray | None) -> None:
+        self._moves.append((kind, end))
+        if kind == "take_back":
+            here = np.concatenate([[self.feed * self._scale], self.joint_angles])
+            step_targets(here, here, SIM_LINK, self._targets)
+            self._target[:] = self._targets[-1]
+        elif kind == "settle":
+            if not self.kinematic:
+                self._substep(self.substeps, self._target)
+        elif end is not None:
+            self._advance(end)
+
+    def _advance(self, end: FloatArray) -> None:
         targets = self._targets
-        step_targets(start, end, SIM_LINK, targets)
-        parts = math.ceil(largest_move(start, targets, SIM_LINK) / (LARGEST_MOVE * SIM_LINK))
+        parts = divide(self._target, end, SIM_LINK, self._largest_move, targets)
         if parts > 1:
             targets = np.empty((self.substeps * parts, 1 + self.n_links))
-            step_targets(start, end, SIM_LINK, targets)
-        return targets
+            step_targets(self._target, end, SIM_LINK, targets)
+        self._begin_pose()
+        for number, target in enumerate(targets):
+            self._substep(number, target)
+        self._target[:] = targets[-1]
 
     def _substep(self, number: int, target: FloatArray) -> None:
         if not self.finite:
             return  # pymunk's own checks would end the process
         self._nodes, self._last_nodes = self._last_nodes, self._nodes
-        place_links(target, SIM_LINK, self._poses, self._nodes)
         self._space.substep = number
-        self._feed_links(target[0])
+        self._feed_links(float(target[0]))
         timestep = CONTROL_TIMESTEP / self.substeps
-        if self.kinematic:
-            pymunk.batch.set_space_bodies(self._space.space, POSES, self._writer)
-        elif self._actuation == "gear":
-            aim_gears(self._chain, self._last_target, target, SIM_LINK, timestep)
-        else:
-            self._compute_forces(target, timestep)
-            self._effort += (self._feed_force, *self._torques)
+        if not self.kinematic and self._actuation == "computed_torque":
+            drive(
+                target,
+                self._last_target,
+                self._state,
+                SIM_LINK,
+                timestep,
+                self._torque_limit,
+                self._n_held,
+                self._poses,
+                self._nodes,
+                self._forces,
+                self._torques,
+                self._effort,
+            )
             self._n_efforts += 1
             pymunk.batch.set_space_bodies(self._space.space, FORCES, self._writer)
+        else:
+            place_links(target, SIM_LINK, self._poses, self._nodes)
+            if self.kinematic:
+                pymunk.batch.set_space_bodies(self._space.space, POSES, self._writer)
+            else:
+                aim_gears(self._chain, self._last_target, target, SIM_LINK, timestep)
         self._last_target[:] = target
         self._space.step(timestep)
         self._read()
 
-    def _compute_forces(self, target: FloatArray, timestep: float) -> None:
-        n_held, forces, torques = self._n_held, self._forces, self._torques
-        self._feed_force = servo_forces(self._state, self._poses, SIM_LINK, timestep, n_held, forces, torques)
-        if np.abs(torques).max() > self._torque_limit:
-            self._feed_force = limited_forces(
-                self._state,
-                self._last_target,
-                target,
-                SIM_LINK,
-                timestep,
-                self._torque_limit,
-                n_held,
-                forces,
-                torques,
-            )
+    def _held(self, feed: float) -> int:
+        """Return how many joints the feeder holds; `feed` in simulator units."""
+        return min(max(math.floor(self.n_links - feed / SIM_LINK) + 1, 0), self.n_links)
 
     def _feed_links(self, feed: float) -> None:
         """Let links collide as soon as their tip end has passed the base."""
-        n_held = min(max(math.floor(self.n_links - feed / SIM_LINK) + 1, 0), self.n_links)
+        n_held = self._held(feed)
         # Dynamic links are still where their last target has sent them.
         self._space.n_held = n_held if self.kinematic else max(n_held, self._n_held)
         first_active = max(n_held - 1, 0)
         self._n_held = n_held
         self._space.activate_links(first_active)
-        self._active = max(self._active, self.n_links - first_active)
+        self._n_active = max(self._n_active, self.n_links - first_active)
 
     def _read(self) -> None:
         """Read all bodies, and compare them with where they belong."""
-        self._clearance = None
+        self._sensed = self._cast = False
         self._reader.clear()
         pymunk.batch.get_space_bodies(self._space.space, STATE, self._reader)
-        self._state[:] = np.frombuffer(self._reader.float_buf()).reshape(-1, 6)[: self.n_links]
+        numbers = np.frombuffer(self._reader.float_buf())
         nodes = self._nodes if self.kinematic else self._last_nodes
-        error, drift = deviation(self._state, nodes, SIM_LINK, self._sim_joints)
-        if math.isnan(error) or not self._space.finite:
-            error = drift = math.inf
-        self._node_error = max(self._node_error, error / self._scale)
-        self._drift = max(self._drift, drift / self._scale)
-        self._worst_node_error = max(self._worst_node_error, self._node_error)
-        self._worst_drift = max(self._worst_drift, self._drift)
+        read_links(numbers, nodes, SIM_LINK, self._state, self._sim_joints, self._tracking)
+        if not self._space.finite:
+            self._tracking[:] = math.inf
 
-    def _begin_pose(self, pose: int) -> None:
-        self.pose = pose
-        self._log.begin_pose(pose)
-        self._space.clearances[:] = math.inf
+    def _begin_pose(self) -> None:
+        self.pose += 1
+        self._log.begin_pose(self.pose)
+        self._space.clearances.fill(math.inf)
         if self.finite:
-            self._node_error = self._drift = 0.0
-        self._effort[:] = 0.0
+            self._tracking[:2] = 0.0
+        self._effort.fill(0.0)
         self._n_efforts = 0
-        self._past_link_poses += self._active
-        self._active = 0
+        self._past_link_poses += self._n_active
+        self._n_active = 0
+
+    # Saving and restoring
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy is made from: pymunk's objects are built again."""
+        options = {name: getattr(self, name) for name in ("maze", "arm", "substeps", "kinematic")}
+        limit = None if math.isinf(self._torque_limit) else self._torque_limit / SIM_LINK**2
+        options |= {"torque_limit": limit, "actuation": self._actuation}
+        return {"options": options, "state": self.get_state()}
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        """Build the simulator of a copy, and go to where it stood."""
+        self.__init__(**saved["options"])  # type: ignore[misc]
+        self.set_state(saved["state"])
+
+    def get_state(self) -> PhysicsState:
+        """Return where the simulation stands; it goes on undisturbed."""
+        return PhysicsState(start=self._start, moves=tuple(self._moves))
+
+    def set_state(self, state: PhysicsState) -> None:
+        """Go back to a state of an arm with as many links in the same maze, exactly."""
+        if len(state.start.links) != self.n_links:
+            raise InputError(
+                f"Expected a state of an arm of {self.n_links} links, got one of {len(state.start.links)}."
+            )
+        self._begin(state.start)
+        for kind, end in state.moves:
+            self._move(kind, end)
+
+    def snapshot(self) -> PhysicsState:
+        """Return a state that is quick to go back to, and go on from it.
+
+        The simulator is built afresh at once, so that what follows now and what follows on `set_state` is
+        the same to the last bit. It may differ in the last digits from what would have followed without.
+        """
+        self._begin(
+            _Start(
+                links=self._state.copy(),
+                target=self._target.copy(),
+                last_target=self._last_target.copy(),
+                touched=self._space.clearances.copy(),
+                effort=self._effort.copy(),
+                n_efforts=self._n_efforts,
+                tracking=self._tracking.copy(),
+                pose=self.pose,
+                n_held=self._n_held,
+                n_active=self._n_active,
+                past_link_poses=self._past_link_poses,
+                log=self._log.copy(),
+            )
+        )
+        return self.get_state()
 
     def _as_target(self, feed: float, joint_angles: ArrayLike) -> FloatArray:
         angles = np.asarray(joint_angles, dtype=np.float64)
         if angles.shape != (self.n_links,):
             raise InputError(f"Expected joint_angles with shape ({self.n_links},), got {angles.shape}.")
         target = np.empty(1 + self.n_links)
-        target[0], target[1:] = float(feed) * self._scale, angles
-        if not np.isfinite(target).all():
+        target[0], target[1:] = feed * self._scale, angles
+        if not math.isfinite(target.sum()):
             raise InputError("Expected a finite feed and finite joint_angles, got NaN or infinity.")
         return target
 
@@ -298,7 +423,7 @@ class Physics:
         """Make sure that pymunk's batches hold the links in our order, then what stands at the origin."""
         states = np.frombuffer(self._reader.float_buf()).reshape(-1, 6)
         assert len(states) <= self.n_links + N_STATIC
-        assert np.array_equal(states[: self.n_links, :3], self._poses)
+        assert np.array_equal(states[: self.n_links], self._start.links)
         assert not states[self.n_links :].any()
 
     # Readings
@@ -323,33 +448,63 @@ class Physics:
     @property
     def tip_position(self) -> FloatArray:
         """The tip, shape (2,), in maze units."""
-        x, y = self._sim_joints[-1]
-        return np.array(self._frame.place_in_maze((float(x), float(y))))
+        return self.sense().readings[1:3].copy()
 
     @property
     def tip_heading(self) -> float:
         """Heading of the last link, in rad."""
-        return float(self._state[-1, 2]) + self._frame.base_pose[2]
+        return float(self.sense().readings[3])
 
     @property
     def feed(self) -> float:
         """Length of arm pushed past the base, in maze units."""
-        return float(self._sim_joints[0, 0]) / self._scale + self.n_links * self.link_length
+        return float(self.sense().readings[0])
 
     @property
     def joint_angles(self) -> FloatArray:
         """Joint angles, shape (n_links,), in rad."""
-        return _relative(self._state[:, 2])
+        return self.sense().joint_angles.copy()
 
     @property
     def feed_speed(self) -> float:
         """In maze units / s."""
-        return float(self._state[0, 3]) / self._scale
+        return float(self.sense().readings[4])
 
     @property
     def joint_speeds(self) -> FloatArray:
         """Speeds of the joint angles, shape (n_links,), in rad / s."""
-        return _relative(self._state[:, 5])
+        return self.sense().joint_speeds.copy()
+
+    def sense(self) -> Senses:
+        """Return what the arm senses, in arrays that the next pose overwrites."""
+        if not self._sensed:
+            read_arm(
+                self._state,
+                self._sim_joints,
+                self._n_held,
+                self._surface,
+                SIM_LINK,
+                self._radius,
+                self._space.clearances,
+                self._frame_numbers,
+                *self._senses,
+            )
+            self._sensed = True
+        return self._senses
+
+    def cast_rays(self) -> FloatArray:
+        """Return how far it is to the walls, in an array that the next pose overwrites.
+
+        Returns
+        -------
+        rays : array, shape (N_TIP_RAYS + 2 * n_links,)
+            In shares of `RAY_REACH` link lengths; see `hrsnake_env.sensing.cast_rays`.
+        """
+        if not self._cast:
+            reach = RAY_REACH * SIM_LINK
+            cast_rays(self._state, self._sim_joints, self._n_held, self._surface, reach, self._rays)
+            self._cast = True
+        return self._rays
 
     @property
     def torques(self) -> FloatArray:
@@ -367,17 +522,17 @@ class Physics:
     @property
     def node_error(self) -> float:
         """Largest distance of a link's end from where it belonged, within the last pose, in maze units."""
-        return self._node_error
+        return float(self._tracking[0]) / self._scale
 
     @property
     def drift(self) -> float:
         """Largest gap between joined links within the last pose, in maze units."""
-        return self._drift
+        return float(self._tracking[1]) / self._scale
 
     @property
     def finite(self) -> bool:
         """Whether all numbers are finite; a simulation that has broken down stands still."""
-        return math.isfinite(self._worst_node_error)
+        return math.isfinite(self._tracking[2])
 
     @property
     def clearance(self) -> FloatArray:
@@ -386,11 +541,7 @@ class Physics:
         Exact where it is positive, at most one link length, and that in the feeder. Where a link has touched
         something within the last pose, the smallest clearance of the contacts, negative below the surface.
         """
-        if self._clearance is None:
-            link_distances(self._sim_joints, self._n_held, self._surface, SIM_LINK, self._distances)
-            free = np.where(self._distances < SIM_LINK, self._distances - self._radius, SIM_LINK)
-            self._clearance = np.minimum(free, self._space.clearances) / self._scale
-        return self._clearance.copy()
+        return self.sense().clearances.copy()
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
@@ -408,18 +559,11 @@ class Physics:
             self.contacts,
             n_poses=self.pose + 1,
             n_links=self.n_links,
-            link_poses=self._past_link_poses + self._active,
+            link_poses=self._past_link_poses + self._n_active,
             link_length=self.link_length,
-            node_error=self._worst_node_error,
-            drift=self._worst_drift,
+            node_error=float(self._tracking[2]) / self._scale,
+            drift=float(self._tracking[3]) / self._scale,
         )
-
-
-def _relative(values: FloatArray) -> FloatArray:
-    """Return each link's value relative to the previous link's, the first as it is."""
-    relative = values.copy()
-    relative[1:] -= values[:-1]
-    return relative
 
 
 def simulate(

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hrsnake_env.appearance import COLOURS, FAR, FEEDER_SHARE
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.contacts import PINCH_TOLERANCE, Contact
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
-from hrsnake_env.rendering import COLOURS, FEEDER_SHARE
 
 __all__ = ["QUANTUM", "Trace", "replay_html", "save_replay", "show"]
 
@@ -181,6 +181,7 @@ def replay_html(traces: Sequence[Trace]) -> str:
         "colours": COLOURS,
         "timestep": timesteps[0],
         "feederShare": FEEDER_SHARE,
+        "clearanceScale": [FAR, PINCH_TOLERANCE],
         "traces": [_packed_trace(trace) for trace in traces],
     }
     parts = {

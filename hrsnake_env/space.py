@@ -38,8 +38,8 @@ class ArmSpace:
         The walls, in simulator units.
     chain : Chain
         The arm's links and joints.
-    poses : array, shape (n_links, 3)
-        Centre and heading of each link, in simulator units and rad.
+    links : array, shape (n_links, 6)
+        Centre, heading, velocity and angular velocity of each link, in simulator units, rad and s.
     radius : float
         Of the links, in simulator units.
     log : ContactLog
@@ -54,7 +54,7 @@ class ArmSpace:
         self,
         pieces: Sequence[WallPiece],
         chain: Chain,
-        poses: FloatArray,
+        links: FloatArray,
         radius: float,
         *,
         log: ContactLog,
@@ -65,18 +65,18 @@ class ArmSpace:
         self.space.iterations = chain.iterations
         # A processed contact is pushed back to the tolerance, and not beyond.
         self.space.collision_slop = 2.0 * TOLERANCE
-        self.n_held = len(poses)
-        self._first_active = len(poses)
+        self.n_held = len(links)
+        self._first_active = len(links)
         self.substep = 0
-        self.clearances = np.full(len(poses), math.inf)
+        self.clearances = np.full(len(links), math.inf)
         self._log, self._frame, self._maze_walls, self._radius = log, frame, walls, radius
         self.finite = True
         self._error: Exception | None = None
         self._masses = [link.mass for link in chain.links]
         self._links: dict[pymunk.Shape, int] = {}
         self._walls: dict[pymunk.Shape, tuple[WallPiece, float]] = {}
-        for k, pose in enumerate(poses):
-            self._add_link(k, chain.links[k], pose)
+        for k, state in enumerate(links.tolist()):
+            self._add_link(k, chain.links[k], state)
         self.space.add(*chain.rest)
         for piece in pieces:
             self._add_wall(piece)
@@ -102,8 +102,9 @@ class ArmSpace:
 
     # Building
 
-    def _add_link(self, k: int, body: pymunk.Body, pose: FloatArray) -> None:
-        body.position, body.angle = (float(pose[0]), float(pose[1])), float(pose[2])
+    def _add_link(self, k: int, body: pymunk.Body, state: list[float]) -> None:
+        x, y, body.angle, speed_x, speed_y, body.angular_velocity = state
+        body.position, body.velocity = (x, y), (speed_x, speed_y)
         half = SIM_LINK / 2.0
         shape = pymunk.Segment(body, (-half, 0.0), (half, 0.0), self._radius + TOLERANCE)
         shape.collision_type, shape.filter = LINK, IN_FEEDER

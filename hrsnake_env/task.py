@@ -1,29 +1,36 @@
-"""The task: reach the goal with the tip, and collide with nothing. Pure functions of the simulator."""
+"""The task: reach the goal with the tip, and collide with nothing. Pure functions and kernels."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from typing import Any
 
+import numba
 import numpy as np
-from gymnasium import spaces
 from numpy.typing import NDArray
 
 from hrsnake_env.arm import FloatArray
-from hrsnake_env.physics import CONTROL_TIMESTEP, Physics
+from hrsnake_env.dynamics import largest_move, step_targets
 
 __all__ = [
-    "COLLISION_PENALTY",
+    "ACTIONS",
+    "CONTACT_PENALTY",
     "FEED_STEP",
     "GOAL_BONUS",
+    "JAM_DRIFT",
+    "JAM_NODE_ERROR",
     "JOINT_STEP",
+    "LARGEST_PROGRESS",
     "LARGEST_STEP",
-    "StepOutcome",
-    "is_jammed",
-    "observation",
-    "observation_parts",
-    "observation_space",
+    "REWARDS",
+    "SPARSE_GOAL_REWARD",
+    "goal_reward_terms",
+    "next_target",
     "reward_terms",
 ]
+
+ACTIONS = ("delta", "absolute")
+REWARDS = ("dense", "sparse")
 
 FEED_STEP = 0.02
 """Largest change of the feed's target in one step, in link lengths."""
@@ -35,105 +42,128 @@ LARGEST_STEP = 0.05
 """Largest movement of any joint's place in one step, in link lengths: many joints together move a tip far."""
 
 GOAL_BONUS = 10.0
-COLLISION_PENALTY = 1.0
+SPARSE_GOAL_REWARD = 1.0
+CONTACT_PENALTY = 0.2
+"""Of a step in which a link went deeper into something than the pinch tolerance, unless told otherwise."""
 
-JAM_NODE_ERROR = 0.05
-JAM_DRIFT = 0.01
+LARGEST_PROGRESS = 2.0 * LARGEST_STEP
+"""Bound of the progress reward of a step, in link lengths; only an arm that walls throw about reaches it."""
+
+JAM_NODE_ERROR = 0.1
+JAM_DRIFT = 0.02
 """In link lengths: an arm that is so far from where it belongs, or torn so far apart, is jammed."""
 
 
-def observation_parts(n_links: int) -> dict[str, tuple[int, float]]:
-    """Return the observation's parts in order: name, length and lower bound; the upper bound is always 1."""
-    return {
-        "feed": (1, 0.0),
-        "joint_angles": (n_links, -1.0),
-        "target_errors": (1 + n_links, -1.0),
-        "speeds": (1 + n_links, -1.0),
-        "goal_offset": (2, -1.0),
-        "tip_heading": (2, -1.0),
-        "goal_distance": (1, 0.0),
-        "clearances": (n_links, -1.0),
-    }
-
-
-def observation_space(n_links: int) -> spaces.Box:
-    """Return the space of `observation`."""
-    low = np.concatenate([np.full(length, bound) for length, bound in observation_parts(n_links).values()])
-    return spaces.Box(low.astype(np.float32), np.ones(len(low), dtype=np.float32), dtype=np.float32)
-
-
-def observation(physics: Physics, target: FloatArray, goal_distance: float) -> NDArray[np.float32]:
-    """Return what a policy sees, scaled to [-1, 1] and cut there.
+def reward_terms(
+    reward_type: str, *, progress: float, collided: bool, succeeded: bool, contact_penalty: float
+) -> dict[str, float]:
+    """Return the terms of the reward by name; the reward is their sum.
 
     Parameters
     ----------
-    physics : Physics
-        The simulator.
-    target : array, shape (1 + n_links,)
-        Where feed and joint angles were last sent, in maze units and rad.
-    goal_distance : float
-        Geodesic distance from the tip to the goal, as a share of the longest there is to be expected.
-
-    Returns
-    -------
-    observation : array, shape (4 * n_links + 8,)
-        Its parts are those of `observation_parts`; all 0 if the simulation has broken down.
-    """
-    if not physics.finite:
-        return np.zeros(4 * physics.n_links + 8, dtype=np.float32)
-    length, maze = physics.link_length, physics.maze
-    feed, angles, heading = physics.feed, physics.joint_angles, physics.tip_heading
-    feed_step = FEED_STEP * length
-    values = np.concatenate(
-        [
-            [max(feed / (physics.n_links * length), 0.0)],
-            angles / np.pi,
-            [(target[0] - feed) / feed_step],
-            (target[1:] - angles) / JOINT_STEP,
-            [physics.feed_speed * CONTROL_TIMESTEP / feed_step],
-            physics.joint_speeds * (CONTROL_TIMESTEP / JOINT_STEP),
-            (maze.goal - physics.tip_position) / maze.size,
-            [np.cos(heading), np.sin(heading)],
-            [goal_distance],
-            physics.clearance / length,
-        ]
-    )
-    seen: NDArray[np.float32] = np.clip(values, -1.0, 1.0).astype(np.float32)
-    return seen
-
-
-@dataclass(frozen=True, kw_only=True)
-class StepOutcome:
-    """Hold what a step has come to.
-
-    Parameters
-    ----------
+    reward_type : {"dense", "sparse"}
+        Sparse has no progress.
     progress : float
-        By how much the geodesic distance from the tip to the goal has decreased, in link lengths.
+        By how much the geodesic distance from the tip to the goal has decreased, in link lengths. As a
+        difference of a potential it leaves the best policy what it is.
     collided : bool
         Whether a link went deeper into something than the pinch tolerance.
     succeeded : bool
-        Whether the tip has come within the goal's radius, with the arm whole.
+        Whether the episode has ended in success.
+    contact_penalty : float
+        At least 0.
     """
-
-    progress: float
-    collided: bool
-    succeeded: bool
-
-
-def reward_terms(outcome: StepOutcome) -> dict[str, float]:
-    """Return the terms of the reward by name; the reward is their sum."""
+    dense = reward_type == "dense"
+    bonus = GOAL_BONUS if dense else SPARSE_GOAL_REWARD
     return {
-        "reward_progress": outcome.progress,
-        "reward_collision": -COLLISION_PENALTY if outcome.collided else 0.0,
-        "reward_goal": GOAL_BONUS if outcome.succeeded else 0.0,
+        "reward_progress": min(max(progress, -LARGEST_PROGRESS), LARGEST_PROGRESS) if dense else 0.0,
+        "reward_contact": -contact_penalty if collided else 0.0,
+        "reward_goal": bonus if succeeded else 0.0,
     }
 
 
-def is_jammed(physics: Physics) -> bool:
-    """Whether the arm is so far from where it belongs that the simulation means nothing any more."""
-    return (
-        not physics.finite
-        or physics.node_error > JAM_NODE_ERROR * physics.link_length
-        or physics.drift > JAM_DRIFT * physics.link_length
-    )
+def goal_reward_terms(
+    reward_type: str,
+    *,
+    distance: FloatArray,
+    goal_radius: float,
+    collided: NDArray[np.bool_],
+    contact_penalty: float,
+) -> dict[str, Any]:
+    """Return the terms of the reward of the mode "goal": functions of where the tip is and where it should be.
+
+    Parameters
+    ----------
+    reward_type : {"dense", "sparse"}
+        Dense is minus the straight distance; sparse has none of it.
+    distance : array, shape (...)
+        From the tip to the goal, as a share of the arm's length.
+    goal_radius : float
+        As a share of the arm's length.
+    collided : array of bool, shape (...)
+        Whether a link went deeper into something than the pinch tolerance.
+    contact_penalty : float
+        At least 0.
+    """
+    return {
+        "reward_progress": -distance if reward_type == "dense" else np.zeros_like(distance),
+        "reward_contact": np.where(collided, -contact_penalty, 0.0),
+        "reward_goal": np.where(distance <= goal_radius, SPARSE_GOAL_REWARD, 0.0),
+    }
+
+
+@numba.njit(cache=True)
+def next_target(
+    target: FloatArray,
+    action: FloatArray,
+    absolute: bool,
+    link_length: float,
+    joint_limit: float,
+    wanted: FloatArray,
+) -> int:
+    """Compute the target after an action, scaled down until no joint's place moves too far.
+
+    Parameters
+    ----------
+    target : array, shape (1 + n_links,)
+        Feed and joint angles to start from, in maze units and rad.
+    action : array, shape (1 + n_links,)
+        Cut to [-1, 1].
+    absolute : bool
+        Whether actions are targets to go to (of the feed from -1, none, to 1, all; of the joints in shares of
+        `joint_limit`) and not changes (in shares of the largest ones).
+    link_length, joint_limit : float
+        In maze units and rad.
+    wanted : array, shape (1 + n_links,)
+        Written; joints in the feeder are straight.
+
+    Returns
+    -------
+    bad : int
+        Index of the first number of the action that is not finite; -1 if there is none.
+    """
+    n = target.shape[0]
+    reach, feed_step = (n - 1) * link_length, FEED_STEP * link_length
+    change, row = np.empty(n), np.empty((1, n))
+    for k in range(n):
+        if not math.isfinite(action[k]):
+            return k
+        value, step = min(max(action[k], -1.0), 1.0), feed_step if k == 0 else JOINT_STEP
+        if absolute:
+            place = 0.5 * (value + 1.0) * reach if k == 0 else value * joint_limit
+            change[k] = min(max(place - target[k], -step), step)
+        else:
+            change[k] = value * step
+    largest = LARGEST_STEP * link_length
+    for _ in range(20):
+        wanted[0] = min(max(target[0] + change[0], 0.0), reach)
+        for k in range(1, n):
+            wanted[k] = min(max(target[k] + change[k], -joint_limit), joint_limit)
+        step_targets(target, wanted, link_length, row)  # straight in the feeder
+        wanted[:] = row[0]
+        move = largest_move(target, row, link_length)
+        if move <= largest * (1.0 + 1e-6):
+            return -1
+        change *= largest / move
+    wanted[:] = target
+    return -1

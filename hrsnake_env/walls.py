@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -15,7 +16,7 @@ from shapely.geometry import LineString, Polygon
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.maze import Maze
 
-__all__ = ["Frame", "WallPiece", "wall_pieces"]
+__all__ = ["Frame", "WallPiece", "has_thin_walls", "wall_pieces"]
 
 CORE_RADII = (0.02, 0.01, 0.005)
 """Radii of the solid layer, in link lengths; the smaller ones stand only in walls too thin for the larger.
@@ -111,6 +112,15 @@ def wall_pieces(maze: Maze, frame: Frame, link_length: float, slot: float, reach
     free_space = Polygon(rings[0], rings[1:])
     edges = shapely.linestrings([np.stack([a, b]) for ring in rings for a, b in pairwise(ring)])
     return surface + _core_pieces(free_space, shapely.STRtree(edges), link_length, slot, reach)
+
+
+def has_thin_walls(pieces: Iterable[WallPiece], link_length: float) -> bool:
+    """Whether walls are too thin for the thickest solid layer, over more than the stump of a corner."""
+    stump = 2.0 * CORE_RADII[0] * link_length
+    return any(
+        0.0 < piece.radius < 0.99 * CORE_RADII[0] * link_length and math.dist(piece.start, piece.end) > stump
+        for piece in pieces
+    )
 
 
 def _slot(half_width: float, reach: float) -> Polygon:

@@ -1,4 +1,4 @@
-"""The `hrsnake` command: plan, longest, validate, simulate, draw, demo.
+"""The `hrsnake` command: plan, longest, validate, simulate, draw, demo, play.
 
 Exit codes: 0 done; 2 bad input, one sentence on stderr; 3 no plan, a motion that is not valid, or a verdict
 that is not clean. `--json` prints one JSON object instead of tables.
@@ -259,6 +259,21 @@ def demo_command(
     _print(as_json, demo.to_dict(), lambda: tables.show_demo(demo))
     if not demo.clean:
         raise typer.Exit(NOT_CLEAN)
+
+
+@app.command("play")
+def play_command(
+    maze: Annotated[
+        str, typer.Argument(metavar="[MAZE]", help=f"A .geojson file, or one of: {', '.join(MAZES)}.")
+    ] = "fig19",
+    link_length: Annotated[float | None, typer.Option("--link-length", help="In maze units.")] = None,
+    links: Annotated[int | None, typer.Option("--links", help="By default enough to reach the goal.")] = None,
+    planner: PlannerOption = "auto",
+) -> None:
+    """Drive the arm through a maze by keys or mouse, in a window; space lets the planner show how."""
+    from planners.play import play
+
+    play(Maze.load(maze), link_length, links, planner)
 
 
 @bench_app.command("speed")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -9,12 +10,20 @@ from numpy.typing import ArrayLike
 
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.task import FEED_STEP, JOINT_STEP
-from planners.problem import Motion
+from planners.planning import plan
+from planners.problem import Motion, PlanningResult, PlanningStatus
 
-__all__ = ["PlannedPolicy", "actions_of"]
+__all__ = ["PlannedPolicy", "PlanningPolicy", "actions_of"]
 
 
-def actions_of(motion: Motion, feed_step: float = FEED_STEP, joint_step: float = JOINT_STEP) -> FloatArray:
+def actions_of(
+    motion: Motion,
+    feed_step: float = FEED_STEP,
+    joint_step: float = JOINT_STEP,
+    *,
+    action: str = "delta",
+    joint_limit: float | None = None,
+) -> FloatArray:
     """Compute the actions that drive the environment along a motion.
 
     Parameters
@@ -22,9 +31,13 @@ def actions_of(motion: Motion, feed_step: float = FEED_STEP, joint_step: float =
     motion : Motion
         A motion from the feeder.
     feed_step : float
-        Feed of an action of 1, in link lengths.
+        Largest change of the feed in a step, in link lengths.
     joint_step : float
-        Change of a joint's target by an action of 1, in rad.
+        Largest change of a joint's target in a step, in rad.
+    action : {"delta", "absolute"}
+        What an action means in the environment.
+    joint_limit : float, optional
+        Of the environment's arm; absolute actions are shares of it, or of pi.
 
     Returns
     -------
@@ -32,14 +45,18 @@ def actions_of(motion: Motion, feed_step: float = FEED_STEP, joint_step: float =
         Each in [-1, 1]: feed, then the joints from the base end. A pose that is farther than one action from
         the last takes several equal ones.
     """
-    changes = np.column_stack(
-        [
-            np.diff(motion.feed) / (feed_step * motion.link_length),
-            np.diff(motion.joint_angles, axis=0) / joint_step,
-        ]
-    )
-    parts = np.maximum(np.ceil(np.abs(changes).max(axis=1) - 1e-9), 1.0).astype(int)
-    return np.repeat(changes / parts[:, None], parts, axis=0)
+    steps = np.array([feed_step * motion.link_length, *([joint_step] * motion.n_links)])
+    poses = np.column_stack([motion.feed, motion.joint_angles])
+    changes = np.diff(poses, axis=0)
+    parts = np.maximum(np.ceil(np.abs(changes / steps).max(axis=1) - 1e-9), 1.0).astype(int)
+    changes = np.repeat(changes / parts[:, None], parts, axis=0)
+    if action == "delta":
+        return changes / steps
+    number = np.concatenate([np.arange(n) for n in parts]) - np.repeat(parts, parts) + 1
+    targets = np.repeat(poses[1:], parts, axis=0) + number[:, None] * changes
+    reach = motion.n_links * motion.link_length
+    limit = np.pi if joint_limit is None else joint_limit
+    return np.column_stack([2.0 * targets[:, 0] / reach - 1.0, targets[:, 1:] / limit])
 
 
 class PlannedPolicy:
@@ -53,12 +70,21 @@ class PlannedPolicy:
     ----------
     motion : Motion
         A motion from the feeder.
-    feed_step, joint_step : float
-        What an action of 1 means in the environment; see `actions_of`.
+    feed_step, joint_step, action, joint_limit
+        What an action means in the environment; see `actions_of`.
     """
 
-    def __init__(self, motion: Motion, feed_step: float = FEED_STEP, joint_step: float = JOINT_STEP) -> None:
-        self.actions = actions_of(motion, feed_step, joint_step)
+    def __init__(
+        self,
+        motion: Motion,
+        feed_step: float = FEED_STEP,
+        joint_step: float = JOINT_STEP,
+        *,
+        action: str = "delta",
+        joint_limit: float | None = None,
+    ) -> None:
+        self.actions = actions_of(motion, feed_step, joint_step, action=action, joint_limit=joint_limit)
+        self._rest = np.zeros_like(self.actions[-1]) if action == "delta" else self.actions[-1]
         self.reset()
 
     def reset(self) -> None:
@@ -92,13 +118,92 @@ class PlannedPolicy:
         state : tuple
             For the next call.
         """
-        shape = np.shape(observation)[:-1]
+        shape = _batch_shape(observation)
         steps = self._steps if state is None else np.asarray(state[0])
         if steps is None or np.shape(steps) != shape:
             steps = np.zeros(shape, dtype=np.int64)
         if episode_start is not None:
             steps = np.where(np.reshape(episode_start, shape), 0, steps)
         done = np.minimum(steps, len(self.actions) - 1)
-        actions = np.where((steps < len(self.actions))[..., None], self.actions[done], 0.0)
+        actions = np.where((steps < len(self.actions))[..., None], self.actions[done], self._rest)
         self._steps = steps + 1
         return actions, (self._steps,)
+
+
+class PlanningPolicy:
+    """Plan at the start of every episode, in the maze that it is in, and follow the motion.
+
+    The expert of the environments whose mazes change. Where there is no plan it holds still. Motions are kept
+    for mazes that come again.
+
+    Parameters
+    ----------
+    env : gymnasium.Env, gymnasium.vector.VectorEnv or stable_baselines3 VecEnv
+        From which the present maze and the arm are read.
+    planner : str
+        See `planners.plan`.
+
+    Attributes
+    ----------
+    statuses : list of PlanningStatus
+        Of the plans, in the order of the episodes.
+    """
+
+    def __init__(self, env: Any, planner: str = "auto") -> None:
+        self.env, self.planner = env, planner
+        self.statuses: list[PlanningStatus] = []
+        self._results: dict[bytes, PlanningResult] = {}
+        self._policies: dict[int, PlannedPolicy | None] = {}
+
+    def predict(
+        self,
+        observation: Any,
+        state: tuple[Any, ...] | None = None,
+        episode_start: ArrayLike | None = None,
+        deterministic: bool = True,
+    ) -> tuple[FloatArray, None]:
+        """Return the next action, as `PlannedPolicy.predict` does; it keeps count itself.
+
+        Without `episode_start` the first call begins an episode, and later calls do not.
+        """
+        shape = _batch_shape(observation)
+        starts = np.zeros(shape, dtype=bool) if episode_start is None else np.reshape(episode_start, shape)
+        actions = []
+        for k, start in enumerate(np.atleast_1d(starts)):
+            if start or k not in self._policies:
+                self._policies[k] = self._plan(k)
+            policy = self._policies[k]
+            actions.append(self._rest(k) if policy is None else policy.predict(np.zeros(1))[0])
+        return np.array(actions).reshape(*shape, -1), None
+
+    def _plan(self, k: int) -> PlannedPolicy | None:
+        maze, arm, action = (self._attribute(name, k) for name in ("maze", "arm", "action_mode"))
+        key = maze.free_space.wkb + np.array([*maze.base_pose, *maze.goal, maze.goal_radius]).tobytes()
+        if key not in self._results:
+            self._results[key] = plan(maze, arm, planner=self.planner, explain=False)
+        result = self._results[key]
+        self.statuses.append(result.status)
+        if result.motion is None:
+            return None
+        return PlannedPolicy(result.motion, action=action, joint_limit=arm.joint_limit)
+
+    def _rest(self, k: int) -> FloatArray:
+        arm, action = self._attribute("arm", k), self._attribute("action_mode", k)
+        rest = np.zeros(1 + arm.n_links)
+        if action == "absolute":
+            rest[0] = -1.0
+        return rest
+
+    def _attribute(self, name: str, k: int) -> Any:
+        if hasattr(self.env, "get_attr"):
+            return self.env.get_attr(name)[k]
+        return getattr(self.env.unwrapped, name)
+
+
+def _batch_shape(observation: Any) -> tuple[int, ...]:
+    """Return () for one observation, (n_envs,) for a batch; dictionaries go by their vector."""
+    if isinstance(observation, Mapping):
+        observation = observation["observation"]
+    shape = np.shape(observation)
+    one = 1 if len(shape) <= 2 else 3  # a vector or a picture
+    return shape[: len(shape) - one]

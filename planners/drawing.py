@@ -12,12 +12,13 @@ import shapely
 from matplotlib.animation import PillowWriter
 from matplotlib.image import imsave
 
+from hrsnake_env.appearance import COLOURS
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.contacts import PINCH_TOLERANCE
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
-from hrsnake_env.rendering import COLOURS, MazePicture
+from hrsnake_env.pictures import MazePicture
 from planners.figures import draw_beams, draw_path, mark_corner
 from planners.problem import Motion, PlanningResult, Progress
 from planners.survey import Geometry, survey

@@ -15,9 +15,10 @@ from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path as Outline
 from numpy.typing import ArrayLike
 
+from hrsnake_env.appearance import COLOURS
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.maze import Maze
-from hrsnake_env.rendering import COLOURS, ArmDrawing
+from hrsnake_env.pictures import ArmDrawing
 from planners.beam_planner import CHOICES
 from planners.beams import Beams
 from planners.corners import Corner

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from hrsnake_env.appearance import COLOURS
 from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
-from hrsnake_env.rendering import COLOURS
 from planners.longest import LongestLink
 
 __all__ = ["draw_longest"]

@@ -206,7 +206,8 @@ def simulate_motion(
     motion.check_maze(maze)
     spec = ArmSpec(link_length=motion.link_length) if arm is None else arm
     spec = dataclasses.replace(spec, n_links=motion.n_links)
-    policy = PlannedPolicy(motion)
+    # Absolute targets: after a collision the arm goes on along the motion, and not beside it.
+    policy = PlannedPolicy(motion, action="absolute")
     env = gym.make(
         ENV_ID,
         max_episode_steps=len(policy.actions) + 2,  # the arm is one substep behind its target
@@ -215,6 +216,7 @@ def simulate_motion(
         n_links=spec.n_links,
         link_radius=spec.link_radius,
         substeps=substeps,
+        action="absolute",
         terminate_on_collision=False,
     )
     episode = run_episode(env, policy, progress=progress)

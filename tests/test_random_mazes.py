@@ -10,10 +10,18 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hrsnake_env import ArmSpec, InputError, Maze, random_maze, task_maze
+from hrsnake_env import ArmSpec, InputError, Maze
 from hrsnake_env.bends import Bend, Corridor, draw_bends, longest_rod_of_bend
 from hrsnake_env.geodesic import GeodesicDistance
-from hrsnake_env.random_mazes import LINK_LENGTH, N_LINKS, N_TASKS, draw_train_maze, index_of_difficulty
+from hrsnake_env.random_mazes import (
+    LINK_LENGTH,
+    N_LINKS,
+    N_TASKS,
+    draw_train_maze,
+    index_of_difficulty,
+    random_maze,
+    task_maze,
+)
 from planners import plan
 from planners.rod_bound import Passage, rod_passes
 

@@ -19,12 +19,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hrsnake_env.appearance import COLOURS
 from hrsnake_env.arm import ArmSpec, configuration_from_joints, joints_from_configuration
 from hrsnake_env.contacts import PINCH_TOLERANCE, Contact
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import fig19
-from hrsnake_env.rendering import COLOURS
 from hrsnake_env.replay import QUANTUM, Trace, replay_html, save_replay, show
 from planners import plan
 from planners.rollout import simulate_motion
