@@ -287,8 +287,8 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         )
         first.check_arm(arm)
         if n_links is None:
-            # A link more than a way 5 % longer takes: links cut corners less well than a string.
-            n_links = math.ceil(1.05 * distance(first.base_pose[:2]) / link_length) + 1
+            # A link more than a way 10 % longer takes: links cut corners less well than a string.
+            n_links = math.ceil(1.1 * distance(first.base_pose[:2]) / link_length) + 1
         self.arm = dataclasses.replace(arm, n_links=n_links)
         self.render_mode = render_mode
         self.action_space = spaces.Box(-1.0, 1.0, (n_links + 1,), np.float32)
