@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import os
-from collections import OrderedDict
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,25 +13,20 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from hrsnake_env import task
-from hrsnake_env.arm import ArmSpec, FloatArray
+from hrsnake_env.arm import FloatArray
 from hrsnake_env.contacts import PinchReport
 from hrsnake_env.errors import InputError
-from hrsnake_env.geodesic import GeodesicDistance, look_ahead
+from hrsnake_env.geodesic import look_ahead
 from hrsnake_env.maze import Maze
 from hrsnake_env.observation import AHEAD, observation_parts, observation_space, write_observation
 from hrsnake_env.options import ResetOptions
 from hrsnake_env.physics import CONTROL_TIMESTEP, Physics, PhysicsState
-from hrsnake_env.random_mazes import LINK_LENGTH, N_LINKS, N_TASKS, task_maze
 from hrsnake_env.rendering import HEIGHT, Frame
+from hrsnake_env.scenes import NO_TASK, Scene, Scenes
 from hrsnake_env.tally import Tally
 from hrsnake_env.view import View
 
 __all__ = ["EnvState", "HyperRedundantMazeEnv"]
-
-N_SCENES = 8
-"""So many mazes are kept ready, with their walls and distances."""
-
-NO_TASK = -1
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -46,16 +39,6 @@ class EnvState:
     physics: PhysicsState
     tally: Tally
     rng: dict[str, Any]
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _Scene:
-    """Hold a maze with what is computed for it once."""
-
-    maze: Maze
-    distance: GeodesicDistance
-    way: float
-    physics: Physics
 
 
 class HyperRedundantMazeEnv(gym.Env[Any, Any]):
@@ -264,41 +247,24 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         _check_one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
         _check_one_of("action", action, task.ACTIONS)
         _check_one_of("reward_type", reward_type, task.REWARDS)
-        _check_one_of("split", split, tuple(N_TASKS))
         _check_at_least("contact_penalty", contact_penalty, 0.0)
         _check_at_least("success_hold_steps", success_hold_steps, 1, whole=True)
         _check_at_least("image_size", image_size, 16, whole=True)
         if goal_radius is not None and not (_is_number(goal_radius) and 0.0 < goal_radius < math.inf):
             raise InputError(f"Expected a positive, finite goal_radius, or None, got {goal_radius!r}.")
-        self._random: dict[str, Any] | None = None
-        if isinstance(maze, str) and maze == "random":
-            link_length = LINK_LENGTH if link_length is None else link_length
-            n_links = N_LINKS if n_links is None else n_links
-            low, high = difficulty
-            self._random = {
-                "difficulty": (float(low), float(high)),
-                "link_length": link_length,
-                "n_links": n_links,
-            }
-            maze = task_maze(split, 0, **self._random)
-        self._split, self._goal_radius = split, goal_radius
-        self._physics_options: dict[str, Any] = {
-            "substeps": substeps,
-            "torque_limit": torque_limit,
-            "actuation": actuation,
-        }
-        first = self._with_goal(maze if isinstance(maze, Maze) else Maze.load(maze), None)
-        distance = GeodesicDistance(first)
-        if link_length is None:
-            link_length = 1.5 * _mean_width(first)
-        arm = ArmSpec(
-            link_length=link_length, n_links=n_links, link_radius=link_radius, joint_limit=joint_limit
+        self._scenes = Scenes(
+            maze,
+            link_length=link_length,
+            n_links=n_links,
+            link_radius=link_radius,
+            joint_limit=joint_limit,
+            goal_radius=goal_radius,
+            split=split,
+            difficulty=difficulty,
+            physics={"substeps": substeps, "torque_limit": torque_limit, "actuation": actuation},
         )
-        first.check_arm(arm)
-        if n_links is None:
-            # A link more than a way 10 % longer takes: links cut corners less well than a string.
-            n_links = math.ceil(1.1 * distance(first.base_pose[:2]) / link_length) + 1
-        self.arm = dataclasses.replace(arm, n_links=n_links)
+        self.arm = self._scenes.arm
+        link_length, n_links = self.arm.link_length, int(self.arm.n_links or 0)
         self.render_mode = render_mode
         self.action_space = spaces.Box(-1.0, 1.0, (n_links + 1,), np.float32)
         self.observation_space = observation_space(observation, n_links, rays=rays, image_size=image_size)
@@ -323,13 +289,9 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         self._ahead = np.array(AHEAD) * link_length
         self._target, self._wanted = np.zeros(1 + n_links), np.zeros(1 + n_links)
         self._no_rays, self._places = np.zeros(0), np.zeros((len(AHEAD), 2))
-        size = (HEIGHT, HEIGHT) if self._random else None
-        self._view = View(size, fps=self.metadata["render_fps"])
+        self._view = View((HEIGHT, HEIGHT) if self._scenes.random else None, fps=self.metadata["render_fps"])
         self._eye = View((image_size, image_size), fps=self.metadata["render_fps"])
-        self._scenes: OrderedDict[Maze, _Scene] = OrderedDict()
-        self._task_id = NO_TASK if self._random is None else 0
-        self._first_maze = first
-        self._enter(first, distance)
+        self._enter(self._scenes.first, 0 if self._scenes.random else NO_TASK)
         self._start(0.0, np.zeros(n_links))
 
     # The Gymnasium interface
@@ -360,8 +322,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         if wanted.state is not None:
             self._return_to(wanted.state)
         else:
-            maze = self._wanted_maze(wanted)
-            self._enter(maze)
+            self._enter(*self._scenes.choose(wanted, self.np_random))
             self._start(wanted.feed, wanted.joint_angles)
         if self.render_mode == "human":
             self.render()
@@ -519,53 +480,17 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
     def _return_to(self, state: Any) -> None:
         if not isinstance(state, EnvState):
             raise InputError(f"Expected a state from get_state or snapshot, got {type(state).__name__}.")
-        self._enter(state.maze)
+        self._enter(self._scenes.of(state.maze), state.task_id)
         self.physics.set_state(state.physics)
-        self._task_id = state.task_id
         self._target = state.target.copy()
         self._look_ahead()
         self._tally = state.tally.copy()
 
     # What it is made of
 
-    def _with_goal(self, maze: Maze, goal: FloatArray | None) -> Maze:
-        """Return a maze with the goal that is asked for."""
-        changes: dict[str, Any] = {} if goal is None else {"goal": goal}
-        if self._goal_radius is not None:
-            changes["goal_radius"] = self._goal_radius
-        return dataclasses.replace(maze, **changes) if changes else maze
-
-    def _wanted_maze(self, wanted: ResetOptions) -> Maze:
-        if wanted.task_id is not None and self._random is None:
-            raise InputError("Expected maze='random' for the reset option 'task_id', got another maze.")
-        maze, self._task_id = wanted.maze_given(), NO_TASK
-        if maze is None and self._random is not None:
-            n_tasks = N_TASKS[self._split]
-            task_id = int(self.np_random.integers(n_tasks)) if wanted.task_id is None else wanted.task_id
-            self._task_id, maze = task_id, task_maze(self._split, task_id, **self._random)
-        if maze is None:
-            maze = self._first_maze
-            return maze if wanted.goal is None else self._with_goal(maze, wanted.goal)
-        return self._with_goal(maze, wanted.goal)
-
-    def _enter(self, maze: Maze, distance: GeodesicDistance | None = None) -> None:
-        """Make a maze the present one; its walls and distances are computed when it is new."""
-        scene = self._scenes.get(maze)
-        if scene is None:
-            maze.check_arm(self.arm)
-            distance = distance or GeodesicDistance(maze)
-            scene = _Scene(
-                maze=maze,
-                distance=distance,
-                way=distance(maze.base_pose[:2]),
-                physics=Physics(maze, self.arm, **self._physics_options),
-            )
-            self._scenes[maze] = scene
-            if len(self._scenes) > N_SCENES:
-                self._scenes.popitem(last=False)
-        self._scenes.move_to_end(maze)
-        self._scene = scene
-        self._goal = (float(maze.goal[0]), float(maze.goal[1]))
+    def _enter(self, scene: Scene, task_id: int) -> None:
+        self._scene, self._task_id = scene, task_id
+        self._goal = (float(scene.maze.goal[0]), float(scene.maze.goal[1]))
 
     def _start(self, feed: float, joint_angles: FloatArray) -> None:
         physics = self.physics
@@ -674,11 +599,6 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             "worst_depth": tally.worst_depth,
             "worst_impulse": tally.worst_impulse,
         }
-
-
-def _mean_width(maze: Maze) -> float:
-    """Return the width of the corridor that has the maze's area and length of walls."""
-    return float(2.0 * maze.free_space.area / maze.free_space.length)
 
 
 def _check_one_of(what: str, value: Any, available: tuple[Any, ...]) -> None:

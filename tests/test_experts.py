@@ -25,6 +25,7 @@ class Endings:
         self.env, self.successes, self.clean = env, [], []
 
     def __call__(self, local, _):
+        """Look at what `evaluate_policy` knows after a step."""
         if local["done"]:
             self.successes.append(bool(local["info"]["is_success"]))
             self.clean.append(
