@@ -18,6 +18,14 @@ test: $(VENV)/.all
 notebooks: $(VENV)/.all
 	$(BIN)/python docs/execute_notebooks.py
 
+## docs: build the site strictly, to site/; a page for each environment is made on the way
+docs: $(VENV)/.all
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+
+## docs-pictures: draw the pictures of the environments' pages again, and their run to play
+docs-pictures: $(VENV)/.all
+	$(BIN)/python docs/make_environment_pictures.py
+
 ## kernels: the tests of the kernels once more as plain Python, where an index out of bounds is an error
 kernels: $(VENV)/.all
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest tests/test_kernels.py tests/test_beam_rules.py tests/test_geometry.py \
