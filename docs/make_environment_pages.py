@@ -11,13 +11,12 @@ import inspect
 import json
 import math
 import re
-from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import environment_docstring as doc
 import gymnasium as gym
-import numpy as np
+from environment_tables import as_table, bounds, span
 
 from hrsnake_env import ENVIRONMENTS, LADDER
 from hrsnake_env.env import HyperRedundantMazeEnv
@@ -60,7 +59,7 @@ def short_name(name: str) -> str:
     >>> short_name("HyperRedundantMaze-UTurn-I50-Sparse-v0")
     'UTurn-I50-Sparse'
     """
-    return name.removesuffix("-v0").removeprefix("HyperRedundantMaze").removeprefix("-") or "your own maze"
+    return name.removesuffix("-v0").removeprefix("HyperRedundantMaze").removeprefix("-") or "Any maze"
 
 
 def groups() -> dict[str, list[str]]:
@@ -97,7 +96,7 @@ def page(name: str) -> str:
         MAKE.format(name=name),
         PICTURES.format(stem=picture(name)),
         "## Facts",
-        as_table(("", ""), facts(name)),
+        as_table(facts(name)[0], facts(name)[1:]),
         "## Scores",
         scores(name),
         "## Description",
@@ -124,14 +123,17 @@ def overview(text: str) -> str:
         rows = [
             (
                 f"![](pictures/{picture(name)}.png){{ .thumbnail loading=lazy }}",
-                f"[{short_name(name)}]({name}.md)",
+                f"[{short_name(name)}]({name}.md)" + (f"<br>[sparse]({twin(name)}.md)" if twin(name) else ""),
                 str(made(name).unwrapped.arm.n_links),
                 index(name),
                 role(name),
             )
             for name in names
+            if "-Sparse" not in name
         ]
-        tables.append(f"## {title}\n\n" + as_table(("", "id", "links", "index", "what it is for"), rows))
+        if not rows:
+            continue
+        tables.append(f"## {title}\n\n" + as_table(("", "id", "links", "index", "role"), rows))
     before, after = text.split(MARKER)
     return before + "\n\n".join(tables) + after
 
@@ -157,16 +159,22 @@ def facts(name: str) -> list[tuple[str, str]]:
     maze, units = made(name).unwrapped.maze, made(name).unwrapped.maze.units
     is_random = arguments.get("maze") == "random"
     reward = arguments.get("reward_type", "dense")
-    other = name.replace("-Sparse-v0", "-v0") if reward == "sparse" else name.replace("-v0", "-Sparse-v0")
     return [
         ("maze", f"drawn at each reset, split `{arguments['split']}`" if is_random else f"`{maze.name}`"),
         ("link length", f"{arm.link_length:.4g} {units}"),
         ("links", f"{arm.n_links}"),
         ("longest rod that passes", longest_rod(name)),
         ("index", index(name)),
-        ("reward type", f"{reward}; [the other]({other}.md)" if other in ENVIRONMENTS else reward),
+        ("reward type", f"{reward}; [the other]({twin(name)}.md)" if twin(name) else reward),
         ("time limit", f"{limit(name)} steps of {CONTROL_TIMESTEP:g} s"),
     ]
+
+
+def twin(name: str) -> str | None:
+    """Return the id with the other rewards, if there is one."""
+    sparse = "-Sparse-v0"
+    other = name.replace(sparse, "-v0") if name.endswith(sparse) else name.replace("-v0", sparse)
+    return other if other in ENVIRONMENTS else None
 
 
 def longest_rod(name: str) -> str:
@@ -204,10 +212,11 @@ def scores(name: str) -> str:
                 f"{score['collided']}",
             )
         )
-    heads = ("policy", "episodes", "success", "return", "steps", "with a collision")
+    heads = ("policy", "episodes", "success", "return", "steps", "collided")
     note = (
         "Means over the episodes; one without a valid motion counts as a failure with return 0, and has no "
-        "steps. Follow-the-leader keeps all joints on the path of the tip. Measured by "
+        "steps; collided are those with a collision. Follow-the-leader keeps all joints on the way of the "
+        "tip. Measured by "
         f"`{read_scores()['command']}`."
     )
     return as_table(heads, rows) + "\n\n" + note
@@ -308,22 +317,3 @@ def rung(name: str) -> Rung:
 def limit(name: str) -> str:
     """Return the time limit of an id, in steps."""
     return f"{ENVIRONMENTS[name]['max_episode_steps']:,}"
-
-
-def span(start: int, stop: int) -> str:
-    """Return a range of indices in words; `stop` is not in it."""
-    return f"{start}" if stop == start + 1 else f"{start} to {stop - 1}"
-
-
-def bounds(space: gym.spaces.Space[Any], start: int, stop: int) -> tuple[str, str]:
-    """Return least and largest value of a range of a box, which are the same in all of it."""
-    assert isinstance(space, gym.spaces.Box)
-    low, high = (np.unique(values[start:stop]).tolist() for values in (space.low, space.high))
-    assert len(low) == len(high) == 1
-    return f"{low[0]:g}", f"{high[0]:g}"
-
-
-def as_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table in Markdown."""
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)

@@ -19,6 +19,9 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
     """List the pages of the environments below their overview."""
     entries: list[Any] = [{"Overview": OVERVIEW}]
     for title, names in environments.groups().items():
+        if len(names) == 1:
+            entries.append({title: source(names[0])})
+            continue
         entries.append({title: [{environments.short_name(name): source(name)} for name in names]})
     assert config.nav is not None
     config.nav = [
