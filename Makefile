@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 OLD := .venv-oldest
 INPUTS := pyproject.toml constraints.txt
 
-.PHONY: demo test oldest notebooks kernels lint types contracts check format clean
+.PHONY: demo test oldest notebooks docs docs-pictures kernels lint types contracts check format clean
 
 ## demo: plan, check and simulate the paper's benchmark; writes demo/
 demo: $(VENV)/.core
@@ -18,9 +18,9 @@ test: $(VENV)/.all
 notebooks: $(VENV)/.all
 	$(BIN)/python docs/execute_notebooks.py
 
-## docs: build the site strictly, to site/; a page for each environment is made on the way
+## docs: build the site strictly, to site/; a page for each environment is made on the way (--quiet would make it lax)
 docs: $(VENV)/.all
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 ## docs-pictures: draw the pictures of the environments' pages again, and their run to play
 docs-pictures: $(VENV)/.all
@@ -59,7 +59,7 @@ format: $(VENV)/.all
 	$(BIN)/ruff format .
 
 clean:
-	rm -rf $(VENV) $(OLD) demo notebooks/build
+	rm -rf $(VENV) $(OLD) demo site notebooks/build
 
 $(BIN)/python:
 	$(PYTHON) -c 'import sys; sys.exit("hrsnake needs Python 3.11 or newer; try: make demo PYTHON=python3.11" if sys.version_info < (3, 11) else 0)'

@@ -123,7 +123,8 @@ def overview(text: str) -> str:
         rows = [
             (
                 f"![](pictures/{picture(name)}.png){{ .thumbnail loading=lazy }}",
-                f"[{short_name(name)}]({name}.md)" + (f"<br>[sparse]({twin(name)}.md)" if twin(name) else ""),
+                f"[{short_name(name)}]({name}.md){{ .id }}"
+                + (f"<br>[sparse]({twin(name)}.md)" if twin(name) else ""),
                 str(made(name).unwrapped.arm.n_links),
                 index(name),
                 role(name),
