@@ -110,7 +110,9 @@ def test_hindsight_replay_computes_the_rewards_that_the_environment_gave():
 
 def test_hindsight_replay_of_stable_baselines3_learns_from_it():
     sb3 = pytest.importorskip("stable_baselines3")
-    env = gym.make("hrsnake_env:HyperRedundantMaze-Straight-Sparse-v0", observation="goal", max_episode_steps=30)
+    env = gym.make(
+        "hrsnake_env:HyperRedundantMaze-Straight-Sparse-v0", observation="goal", max_episode_steps=30
+    )
     model = sb3.SAC(
         "MultiInputPolicy",
         env,
