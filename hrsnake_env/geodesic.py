@@ -185,7 +185,7 @@ def _ways_from_bends(ways: Ways, ends: FloatArray) -> tuple[FloatArray, NDArray[
     """Return `Ways.lengths`, infinite where there is no way, and `Ways.onward`."""
     a, b = _bends_in_sight(ways, ends).T
     gaps = np.linalg.norm(ways.bends[a] - ways.bends[b], axis=1)
-    graph = csr_array((gaps, (a, b)), shape=(len(ends), len(ends)))
+    graph = csr_array((gaps, (a.astype(np.int32), b.astype(np.int32))), shape=(len(ends), len(ends)))
     lengths, onward = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
     return lengths, np.maximum(onward, 0).astype(np.int32)
 
@@ -205,9 +205,8 @@ def _corners(rings: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
         after = np.diff(ring, axis=0)
         after /= np.linalg.norm(after, axis=1)[:, None]
         before = np.roll(after, 1, axis=0)
-        convex = (
-            before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] < 0.0
-        )  # the free space is on the left
+        # The free space is on the left: at its reflex corners the walls turn right.
+        convex = before[:, 0] * after[:, 1] < before[:, 1] * after[:, 0]
         outward = (before + after)[convex] @ np.array([[0.0, 1.0], [-1.0, 0.0]])
         outward /= np.linalg.norm(outward, axis=1)[:, None]
         corners.append(ring[:-1][convex] + 2.0 * OFF_WALL * outward)
@@ -445,9 +444,8 @@ def _bends_of_cells(ways: Ways, ends: FloatArray) -> FloatArray:
             if wall >= 0 and _hides(ways.walls, wall, x, y, i, j):
                 continue
             if wall < 0 and ways.wall_begins[c] == ways.wall_begins[c + 1]:
-                known[c] = min(
-                    known[c], length + 3.1 * HALF_DIAGONAL
-                )  # by the corner of the cell that is seen
+                # By way of the corner of the cell that the bend sees.
+                known[c] = min(known[c], length + 3.1 * HALF_DIAGONAL)
             rows.append((float(c), float(bend), length))
             for a in range(max(i - 1, 1), min(i + 2, ways.n_x - 1)):
                 for near in range(a * ways.n_y + max(j - 1, 1), a * ways.n_y + min(j + 2, ways.n_y - 1)):

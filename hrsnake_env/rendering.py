@@ -26,6 +26,9 @@ FINE = 2
 THINNEST = 1.5
 """In pixels: no line of the arm is thinner, however small the frame."""
 
+SMALLEST = 16
+"""In pixels: no side of a frame is shorter."""
+
 Frame = NDArray[np.uint8]
 Box = tuple[int, int, int, int]
 
@@ -38,8 +41,8 @@ class FrameRenderer:
     maze : Maze
         The maze.
     size : int or tuple of two ints
-        In pixels. The height; the width then follows from the maze, between 0.4 and 3 times it. Or width and
-        height; the maze then stands in the middle. All even, as video formats want them.
+        In pixels. The height, which is even; the width then follows from the maze, between 0.4 and 3 times
+        it, and is even, too, as video formats want it. Or width and height; the maze stands in the middle.
     link_radius : float
         In maze units.
 
@@ -51,14 +54,15 @@ class FrameRenderer:
     Raises
     ------
     InputError
-        If `size` is not of even whole numbers from 16.
+        If `size` is not of whole numbers from 16.
     """
 
     def __init__(self, maze: Maze, *, size: int | tuple[int, int] = HEIGHT, link_radius: float = 0.0) -> None:
         x_min, y_min, x_max, y_max = shown_window(maze).tolist()
         wide, high = x_max - x_min, y_max - y_min
-        if not isinstance(size, Sequence | np.ndarray):
-            size = (2 * round(_checked(size) * min(max(wide / high, 0.4), 3.0) / 2), size)
+        if not isinstance(size, Sequence):
+            height = _checked(size, even=True)
+            size = (2 * round(height * min(max(wide / high, 0.4), 3.0) / 2), height)
         width, height = (_checked(length) for length in size)
         self.size = (width, height)
         self._scale = min(width / wide, height / high)
@@ -202,10 +206,12 @@ class FrameRenderer:
         return brush.image
 
 
-def _checked(length: Any) -> int:
+def _checked(length: Any, even: bool = False) -> int:
     """Return a side of a frame, in pixels."""
-    if isinstance(length, bool) or not isinstance(length, int | np.integer) or length < 16 or length % 2:
-        raise InputError(f"Expected a size of even whole numbers of pixels, from 16, got {length!r}.")
+    whole = isinstance(length, int | np.integer) and not isinstance(length, bool)
+    if not whole or length < SMALLEST or (even and length % 2):
+        kind = "an even height" if even else "a width and a height"
+        raise InputError(f"Expected {kind} in whole pixels, from {SMALLEST}, got {length!r}.")
     return int(length)
 
 

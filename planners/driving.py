@@ -22,6 +22,9 @@ LARGEST_TURN = math.radians(75.0)
 ROUNDING = 1e-9
 ATTEMPTS = 12
 
+AT_PLACE = 0.01
+"""In steps: an arm that is so near to its place on the path is there."""
+
 
 def joints_along(path: FloatArray, n_links: int, link_length: float) -> FloatArray:
     """Place joints on a path so that the tip is at its end and all links are chords of it.
@@ -177,6 +180,32 @@ class TipDriver(_Driver):
             way *= max(0.98 / steps, 0.25)
         self.note = "the links cannot follow so tight a turn: turn less, or go back"
         return action
+
+    def step_back(self) -> None:
+        """Take the arm's place on the path back by a step, in the same heading, as after a collision."""
+        way = -min(FEED_STEP * self.link_length, max(self.feed, 0.0))
+        if way < -ROUNDING * self.link_length:
+            self._path = self._moved(way)
+            self.joints = joints_along(self._path, self.n_links, self.link_length)
+
+    def return_action(self, target: ArrayLike) -> FloatArray:
+        """Return the action that takes an arm that was pushed off the path back to its place on it.
+
+        Parameters
+        ----------
+        target : array-like, shape (1 + n_links,)
+            From where the action counts, in maze units and rad.
+
+        Returns
+        -------
+        action : array, shape (n_links + 1,)
+            In [-1, 1]. All 0 if the arm is there.
+        """
+        feed, angles = configuration_from_joints(self.joints, self.link_length, self.base_pose)
+        change, steps = self.change_to(np.asarray(target, dtype=np.float64), float(feed), angles)
+        if steps <= AT_PLACE:
+            return np.zeros(1 + self.n_links)
+        return np.clip(change / max(steps, 1.0), -1.0, 1.0)
 
     def _turn(self, share: float) -> None:
         if self.feed < (1.0 - ROUNDING) * self.link_length:

@@ -24,8 +24,8 @@ __all__ = ["MAZE_SIZE", "Controls", "Game"]
 MAZE_SIZE = (960, 576)
 """Of the frames, in pixels."""
 
-HELD = 0.01
-"""In link lengths: an arm that is so far from where it was sent is not sent farther, or it would jam."""
+SLACK = 1.3
+"""So many times the links that the shortest way takes: who drives by hand takes wider turns."""
 
 AT_REST = 1e-6
 """In link lengths: an arm that is nearer to where it was sent is there."""
@@ -80,7 +80,7 @@ class Game:
     link_length : float, optional
         In maze units; by default the environment's.
     n_links : int, optional
-        By default enough to reach the goal.
+        By default enough to reach the goal with some to spare.
     planner : str
         `auto` or a key of `PLANNERS`.
 
@@ -96,20 +96,25 @@ class Game:
         if planner != "auto" and planner not in PLANNERS:
             raise InputError(f"Unknown planner {planner!r}. Available: auto, {', '.join(PLANNERS)}.")
         self.maze, self.planner = maze, planner
+        self._enter(link_length, n_links)
+        if n_links is None:
+            self._enter(link_length, math.ceil(SLACK * self.world.physics.n_links))
+        self.renderer = FrameRenderer(maze, size=MAZE_SIZE, link_radius=self.arm.link_radius)
+        self.controls = Controls()
+        self._shown_how: MotionDriver | None = None
+        self.reset()
+
+    def _enter(self, link_length: float | None, n_links: int | None) -> None:
         self.env = gym.make(
             ENV_ID,
             max_episode_steps=-1,  # a player takes his time
-            maze=maze,
+            maze=self.maze,
             link_length=link_length,
             n_links=n_links,
             terminate_on_collision=False,
         )
         self.world = cast(HyperRedundantMazeEnv, self.env.unwrapped)
         self.arm = self.world.arm
-        self.renderer = FrameRenderer(maze, size=MAZE_SIZE, link_radius=self.arm.link_radius)
-        self.controls = Controls()
-        self._shown_how: MotionDriver | None = None
-        self.reset()
 
     def reset(self, news: str = "you drive") -> None:
         """Take the arm back into the feeder."""
@@ -164,19 +169,31 @@ class Game:
         physics = self.world.physics
         pointed = self.renderer.to_maze(self.controls.pointer)
         turn, feed = self.controls.read(physics.tip_position, self.driver.heading, pointed)
-        held = physics.node_error > HELD * self.arm.link_length
-        action = self.driver.action(self.world.target, turn, min(feed, 0.0) if held else feed)
-        if turn or feed:
-            self.news = self.driver.note or "you drive"
-        if held:
-            self.news = "a wall holds the arm: go back"
-        if action.any() or physics.node_error > AT_REST * self.arm.link_length:
+        hit = self.info["collisions"] > 0
+        if hit:
+            self.driver.step_back()
+        action = self.driver.return_action(self._sent)
+        if action.any():
+            self.news = "a wall is in the way: turn, or go back"
+        else:
+            action = self.driver.action(self._sent, turn, feed)
+            if turn or feed:
+                self.news = self.driver.note or "you drive"
+        if action.any() or hit or physics.node_error > AT_REST * self.arm.link_length:
             self._step(action)
+
+    @property
+    def _sent(self) -> FloatArray:
+        """From where the next action counts, shape (1 + n_links,), in maze units and rad."""
+        if self.info["collisions"]:  # the environment forgets what a wall has refused
+            physics = self.world.physics
+            return np.append(physics.feed, physics.joint_angles)
+        return self.world.target
 
     def _advance_by_plan(self, driver: MotionDriver) -> None:
         way = 0.0
         for _ in range(MOST_STEPS):
-            action = driver.action(self.world.target)
+            action = driver.action(self._sent)
             if driver.done and not action.any():
                 self.by_plan, self.news = False, "the motion has ended; you drive, from here"
                 self._take_the_wheel()

@@ -66,8 +66,8 @@ def known(name):
     maze = Maze.load(name)
     rng = np.random.default_rng(0)
     low, high = np.reshape(maze.free_space.bounds, (2, 2))
-    points = rng.uniform(low, high, (300, 2))
-    free = points[shapely.contains_xy(maze.free_space, *points.T)][:12]
+    points = rng.uniform(low, high, (400, 2))
+    free = points[shapely.contains_xy(maze.free_space, *points.T)][:40]
     starts, ends = maze.walls[rng.permutation(len(maze.walls))[:12]].swapaxes(0, 1)
     on_walls = starts + rng.random((len(starts), 1)) * (ends - starts)
     points = np.concatenate([maze.base_pose[None, :2], free, starts, on_walls])
@@ -196,6 +196,19 @@ def test_the_thinnest_wall_has_two_sides(thickness):
         ahead = distance.ahead((left, 100.0), [over - tip - thickness, over - tip])
         ends = [(200.0 - thickness / 2, 1800.0), (200.0 + thickness / 2, 1800.0)]
         np.testing.assert_allclose(ahead, ends, rtol=0.0, atol=1e-4)
+
+
+@pytest.mark.parametrize("degrees", [60.0, 30.0, 10.0])
+def test_the_point_of_a_sharp_corner_has_a_way(degrees):
+    far = 500.0 * math.tan(math.radians(degrees) / 2)
+    maze = Maze(
+        name="wedge",
+        free_space=shapely.Polygon([(0.0, 0.0), (500.0, -far), (500.0, far)]),
+        base_pose=(400.0, 0.0, 0.0),
+        goal=(300.0, 0.0),
+        goal_radius=9.0,
+    )
+    assert GeodesicDistance(maze)((0.0, 0.0)) == pytest.approx(300.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("width", [200.0, 6.0, 0.05, 1e-3])
