@@ -16,14 +16,11 @@ from hrsnake_env.maze import Maze
 from hrsnake_env.task import FEED_STEP, JOINT_STEP
 from planners.baselines.path_following import STOP, followed_track
 from planners.feeding import feed, motion_of
-from planners.planning import PLANNERS, plan
+from planners.motion_cache import N_MAZES, MotionCache, maze_key
 from planners.problem import Motion
 from planners.query import Query
 
-__all__ = ["MotionCache", "PlannedResets", "ResidualFollower", "follow_the_leader"]
-
-N_MAZES = 100
-"""For so many mazes motions are kept."""
+__all__ = ["PlannedResets", "ResidualFollower", "follow_the_leader"]
 
 AT_BASE = -1
 
@@ -38,66 +35,6 @@ AT_GOAL = 1e-6
 
 SLOWEST = 0.01
 """The feed never waits with less than this share of its step."""
-
-
-class MotionCache:
-    """Plan through mazes, and keep the motions for those that come again.
-
-    Parameters
-    ----------
-    planner : str
-        See `planners.plan`.
-
-    Raises
-    ------
-    InputError
-        If the planner is unknown.
-    """
-
-    def __init__(self, planner: str = "auto") -> None:
-        if planner != "auto" and planner not in PLANNERS:
-            raise InputError(f"Unknown planner {planner!r}. Available: auto, {', '.join(PLANNERS)}.")
-        self.planner = planner
-        self._motions: OrderedDict[bytes, Motion | None] = OrderedDict()
-
-    def motion(self, maze: Maze, arm: ArmSpec) -> Motion | None:
-        """Return a motion of all the arm's links; None if there is no plan, or it takes more links."""
-        key = _maze_key(maze)
-        if key not in self._motions:
-            self._keep(key, self._planned(maze, arm))
-        self._motions.move_to_end(key)
-        return self._motions[key]
-
-    def add(self, motion: Motion, maze: Maze, arm: ArmSpec) -> None:
-        """Keep a motion that is there already.
-
-        Raises
-        ------
-        InputError
-            If it is of another arm, or from another base.
-        """
-        motion.check_maze(maze)
-        if not np.isclose(motion.link_length, arm.link_length, rtol=1e-9):
-            raise InputError(
-                f"Expected a motion of links of {arm.link_length:g} {maze.units}, got one of links of "
-                f"{motion.link_length:g}."
-            )
-        self._keep(_maze_key(maze), motion.with_links(int(arm.n_links or motion.n_links)))
-
-    def _planned(self, maze: Maze, arm: ArmSpec) -> Motion | None:
-        try:
-            return plan(maze, arm, planner=self.planner, explain=False).motion
-        except InputError:  # the arm is too short for the motions that were found
-            return None
-
-    def _keep(self, key: bytes, motion: Motion | None) -> None:
-        self._motions[key] = motion
-        if len(self._motions) > N_MAZES:
-            self._motions.popitem(last=False)
-
-
-def _maze_key(maze: Maze) -> bytes:
-    return bytes(maze.free_space.wkb) + np.array([*maze.base_pose, *maze.goal, maze.goal_radius]).tobytes()
 
 
 class PlannedResets(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
@@ -230,7 +167,7 @@ class ResidualFollower(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         """Start an episode; see `HyperRedundantMazeEnv.reset`."""
         observation, info = self.env.reset(seed=seed, options=options)
         maze, arm = self._world.maze, self._world.arm
-        key = _maze_key(maze)
+        key = maze_key(maze)
         if key not in self._followers:
             self._followers[key] = follow_the_leader(maze, arm)
             if len(self._followers) > N_MAZES:

@@ -10,7 +10,8 @@ from gymnasium.utils.env_checker import check_env
 from hrsnake_env import ArmSpec, InputError, Maze
 from hrsnake_env.ladder import LADDER
 from planners import plan
-from planners.wrappers import MotionCache, PlannedResets, ResidualFollower, follow_the_leader
+from planners.motion_cache import MotionCache
+from planners.wrappers import PlannedResets, ResidualFollower, follow_the_leader
 
 TIGHT = "hrsnake_env:HyperRedundantMaze-UTurn-I80-v0"
 RANDOM = "hrsnake_env:HyperRedundantMaze-RandomTrain-v0"
