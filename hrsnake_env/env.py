@@ -350,7 +350,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         if bad >= 0:
             raise InputError(f"Expected a finite action, got {values[bad]} at index {bad}.")
         self._target, self._wanted = self._wanted, self._target
-        self.physics.advance(self._target[0], self._target[1:])
+        self.physics.advance_to(self._target)
         terminated, reward = self._judge()
         if self.render_mode == "human":
             self.render()
@@ -497,7 +497,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         physics.reset(feed, joint_angles)
         self._target[:] = physics.target
         self._tally = Tally(distance=self._scene.way)
-        self._tally.distance = self._look_ahead()
+        self._tally.distance, self._tally.tip_distance = self._look_ahead(), self._tip_distance()
         if feed > 0.0:
             self._check_start()
 
@@ -511,7 +511,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
                     f"Expected a start clear of the walls, got link {contact.link} {-contact.clearance:.3g} "
                     f"{self.maze.units} deep in {what} at ({contact.point[0]:g}, {contact.point[1]:g})."
                 )
-        if self._tip_distance() <= self.maze.goal_radius:
+        if self._tally.tip_distance <= self.maze.goal_radius:
             raise InputError("Expected a start outside the goal's radius, got one with the tip at the goal.")
         self._tally.see(self.physics.pose_contacts)
 
@@ -526,7 +526,8 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             or physics.drift > task.JAM_DRIFT * length
         )
         failed = jammed or (tally.collided and self._terminate_on_collision)
-        at_goal = not failed and self._tip_distance() <= self.maze.goal_radius
+        tally.tip_distance = self._tip_distance()
+        at_goal = not failed and tally.tip_distance <= self.maze.goal_radius
         tally.steps_at_goal = tally.steps_at_goal + 1 if at_goal else 0
         tally.succeeded = tally.steps_at_goal >= self._success_hold_steps
         if self._mode == "goal":
@@ -580,7 +581,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             "is_success": tally.succeeded,
             "progress": 1.0 - tally.distance / self._scene.way,
             "feed": float(readings[0]),
-            "tip_distance": self._tip_distance(),
+            "tip_distance": tally.tip_distance,
             "goal_distance": tally.distance,
             "clearance": float(readings[5]),
             "pinches": tally.pinches,
