@@ -22,8 +22,12 @@ MARGINS = (0.1, 0.05, 0.02, 0.01, 0.0)
 
 Motions planned without one touch the walls, and who imitates them with the least error collides."""
 
-KEPT = 0.002
-"""So near to a wall noise does not take a link, in link lengths: twice the pinch tolerance."""
+KEPT = 0.005
+"""So near to a wall noise does not take a link, in link lengths: links in haste stray.
+
+Of 80 episodes in tight mazes with noise of 0.6 and 1, 17 fail with 0.002, 9 with this, 7 with 0.01; but the
+farther off, the less noise is left there.
+"""
 
 AHEAD = 20
 """So many steps of the motion ahead are looked at for the one that is nearest."""
