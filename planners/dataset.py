@@ -219,8 +219,8 @@ def _new_folder(root: Path, dataset_id: str) -> Path:
         parse_dataset_id(dataset_id)
     except (ValueError, TypeError):  # the latter without a version
         raise InputError(
-            f"Expected the id of a data set as name-v0 or namespace/name-v0, of letters, digits, _ and -, and "
-            f"no namespace of a single letter, got {dataset_id!r}."
+            f"Expected the id of a data set as name-v0 or namespace/name-v0, of letters, digits, _ and -, "
+            f"and no namespace of a single letter, got {dataset_id!r}."
         ) from None
     folder = root / dataset_id
     if folder.exists():
