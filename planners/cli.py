@@ -1,4 +1,4 @@
-"""The `hrsnake` command: plan, longest, validate, simulate, draw, demo, play.
+"""The `hrsnake` command: plan, longest, validate, simulate, draw, demo, play, dataset.
 
 Exit codes: 0 done; 2 bad input, one sentence on stderr; 3 no plan, a motion that is not valid, or a verdict
 that is not clean. `--json` prints one JSON object instead of tables.
@@ -274,6 +274,63 @@ def play_command(
     from planners.play import play
 
     play(Maze.load(maze), link_length, links, planner)
+
+
+@app.command("dataset")
+def dataset_command(
+    dataset_id: Annotated[
+        str, typer.Argument(metavar="OUT_ID", help="As Minari has it: name-v0 or namespace/name-v0.")
+    ],
+    env: Annotated[
+        list[str] | None,
+        typer.Option("--env", help="An environment; a data set for each. By default random mazes."),
+    ] = None,
+    episodes: Annotated[int, typer.Option("--episodes", help="For each noise level and maze.")] = 10,
+    noise: Annotated[
+        list[float] | None,
+        typer.Option("--noise", help="Of the actions, in shares of the largest one. By default 0 and 0.3."),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", help="Of the first episode.")] = 0,
+    maze: Annotated[
+        list[str] | None, typer.Option("--maze", help="Another maze for the environment's arm.")
+    ] = None,
+    only_success: Annotated[
+        bool, typer.Option("--only-success", help="Leave out episodes that miss the goal.")
+    ] = False,
+    path: Annotated[
+        Path | None, typer.Option("--path", help="Folder of data sets; by default Minari's.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Record demonstrations of the planner as a Minari data set."""
+    from planners.dataset import dataset_ids, record_dataset
+
+    if path is not None:
+        _check_folder(path)
+    env_ids = list(dict.fromkeys(env or ["HyperRedundantMaze-RandomTrain-v0"]))
+    with _progress(as_json) as progress:
+        recordings = [
+            record_dataset(
+                name,
+                env_id,
+                episodes=episodes,
+                noises=noise or (0.0, 0.3),
+                seed=seed,
+                mazes=maze or (),
+                only_success=only_success,
+                path=path,
+                progress=progress,
+            )
+            for name, env_id in zip(dataset_ids(dataset_id, env_ids), env_ids, strict=True)
+        ]
+
+    def show() -> None:
+        for recording in recordings:
+            tables.show_rows(f"Data set {recording.dataset_id}", recording.rows())
+
+    _print(as_json, {"datasets": [recording.to_dict() for recording in recordings]}, show)
+    if not all(recording.n_episodes for recording in recordings):
+        raise typer.Exit(NOT_CLEAN)
 
 
 @bench_app.command("speed")
