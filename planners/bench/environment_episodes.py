@@ -111,7 +111,8 @@ def episodes(mazes: Sequence[str], runs: int, tell: Tell = lambda: None) -> dict
         For each maze and number of substeps: seconds of processor time from the reset to the goal, and the
         largest errors in px at a link of 230.
     """
-    cases = [(_motion(maze), maze, substeps) for maze in mazes for substeps in SUBSTEPS]
+    motions = {maze: _motion(maze) for maze in mazes}
+    cases = [(motions[maze], maze, substeps) for maze in mazes for substeps in SUBSTEPS]
     every: list[list[dict[str, Any]]] = [[] for _ in cases]
     for _ in range(runs + 1):
         for case, seen in zip(cases, every, strict=True):
@@ -156,7 +157,8 @@ def _episode(motion: Motion, maze: str, substeps: int) -> dict[str, Any]:
         substeps=substeps,
         max_episode_steps=len(actions) + 2,
     )
-    rest, infos, over = 0.0 * actions[0], [], False
+    infos: list[dict[str, Any]] = []
+    rest, over = 0.0 * actions[0], False
     start = time.process_time()
     env.reset()
     while not over:

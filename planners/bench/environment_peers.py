@@ -8,10 +8,10 @@ import subprocess
 import sys
 import tempfile
 import venv
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from hrsnake_env.errors import InputError
 from planners.bench.environment_scenes import ENV_ID, arm_in_hall, half_out, hall
 from planners.bench.pool import Tell
 
-__all__ = ["PEERS", "TARGETS", "StepperProcess", "beside_peers", "ours_in_hall", "peers_python", "spread"]
+__all__ = ["PEERS", "TARGETS", "beside_peers", "ours_in_hall", "peers_python", "spread", "stepping"]
 
 PEERS: dict[str, dict[str, Any]] = {
     "gym-pusht": {"make": "gym_pusht:gym_pusht/PushT-v0", "arguments": {"obs_type": "state"}},
@@ -62,7 +62,9 @@ def peers_python(folder: Path) -> Path:
     if ready.exists() and json.loads(ready.read_text(encoding="utf-8")) == list(REQUIREMENTS):
         return python
     if folder.exists() and any(folder.iterdir()) and not (folder / "pyvenv.cfg").exists():
-        raise InputError(f"Expected a virtual environment, or nothing yet, in '{folder}', got something else.")
+        raise InputError(
+            f"Expected a virtual environment, or nothing yet, in '{folder}', got something else."
+        )
     print(f"Installing {' and '.join(REQUIREMENTS)} in '{folder}', once.", file=sys.stderr)
     try:
         venv.create(folder, with_pip=True, clear=True)
@@ -82,8 +84,11 @@ def _last_line(error: Exception) -> str:
     return said.strip().splitlines()[-1] if said.strip() else type(error).__name__
 
 
-class StepperProcess:
-    """A process that steps through one environment, and answers how fast it was.
+@contextmanager
+def stepping(
+    python: Path | str, order: Mapping[str, Any], script: Path | None = None
+) -> Iterator[Callable[[float], dict[str, float]]]:
+    """Start a process that steps through one environment; it ends with the block.
 
     Parameters
     ----------
@@ -94,54 +99,56 @@ class StepperProcess:
     script : Path, optional
         By default `environment_stepper.py`.
 
+    Yields
+    ------
+    run : callable
+        Lets it step for so many seconds of its processor's time, and returns what it has counted.
+
     Raises
     ------
     InputError
-        If the environment cannot be made there.
+        If the environment cannot be made or stepped through there; now, or by `run`.
     """
-
-    def __init__(self, python: Path | str, order: Mapping[str, Any], script: Path | None = None) -> None:
-        script = Path(__file__).with_name("environment_stepper.py") if script is None else script
-        root = str(Path(__file__).parents[2])  # so that it also runs from a checkout that is not installed
-        path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
-        one_thread = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-        self._name, self._said = str(order["make"]), tempfile.TemporaryFile("w+")
-        self._process = subprocess.Popen(
-            [str(python), "-P", str(script)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._said,
-            text=True,
-            env={**os.environ, **one_thread, "PYTHONPATH": path},
-        )
-        self.made = self._ask(order)
-
-    def run(self, seconds: float) -> dict[str, float]:
-        """Let it step for so many seconds of its processor time; return what it has counted."""
-        return self._ask({"run": seconds})
-
-    def close(self) -> None:
-        """End the process."""
-        self._process.kill()
-        self._process.communicate()
-        self._said.close()
-
-    def _ask(self, order: Mapping[str, Any]) -> dict[str, Any]:
-        assert self._process.stdin is not None and self._process.stdout is not None
-        answer = ""
+    script = Path(__file__).with_name("environment_stepper.py") if script is None else script
+    root = str(Path(__file__).parents[2])  # so that it also runs from a checkout that is not installed
+    path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
+    one_thread = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    environ = {**os.environ, **one_thread, "PYTHONPATH": path}
+    with tempfile.TemporaryFile("w+") as said:
         try:
-            self._process.stdin.write(json.dumps(order) + "\n")
-            self._process.stdin.flush()
-            answer = self._process.stdout.readline()
-        except BrokenPipeError:
-            pass
-        if answer:
-            return dict(json.loads(answer))
-        self._process.wait()
-        self._said.seek(0)
-        said = self._said.read().strip().splitlines() or ["nothing"]
-        self.close()
-        raise InputError(f"Expected steps of '{self._name}', got: {said[-1]}")
+            process = subprocess.Popen(
+                [str(python), "-P", str(script)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=said,
+                text=True,
+                env=environ,
+            )
+        except OSError as error:
+            raise InputError(f"Expected a Python to run, got '{python}': {error.strerror}.") from None
+        try:
+            _ask(process, order, order["make"], said)
+            yield lambda seconds: _ask(process, {"run": seconds}, order["make"], said)
+        finally:
+            process.kill()
+            process.communicate()
+
+
+def _ask(
+    process: subprocess.Popen[str], order: Mapping[str, Any], name: str, said: IO[str]
+) -> dict[str, Any]:
+    assert process.stdin is not None and process.stdout is not None
+    answer = ""
+    with suppress(BrokenPipeError):
+        process.stdin.write(json.dumps(order) + "\n")
+        process.stdin.flush()
+        answer = process.stdout.readline()
+    if answer:
+        return dict(json.loads(answer))
+    process.wait()
+    said.seek(0)
+    lines = said.read().strip().splitlines() or ["nothing"]
+    raise InputError(f"Expected steps of '{name}', got: {lines[-1]}")
 
 
 def ours_in_hall(maze_file: Path) -> dict[tuple[int, int], dict[str, Any]]:
@@ -159,19 +166,16 @@ def ours_in_hall(maze_file: Path) -> dict[tuple[int, int], dict[str, Any]]:
 
 
 @contextmanager
-def _processes(
+def _contenders(
     python: Path | str, peers: Mapping[str, Mapping[str, Any]]
-) -> Iterator[dict[Any, StepperProcess]]:
+) -> Iterator[dict[Any, Callable[[float], dict[str, float]]]]:
     """Start one process for each environment; they end with the block."""
     with ExitStack() as stack, tempfile.TemporaryDirectory() as folder:
-        processes: dict[Any, StepperProcess] = {}
-        for key, order in peers.items():
-            processes[key] = StepperProcess(python, order)
-            stack.callback(processes[key].close)
-        for ours, order in ours_in_hall(Path(folder) / "hall.geojson").items():
-            processes[ours] = StepperProcess(sys.executable, order)
-            stack.callback(processes[ours].close)
-        yield processes
+        runs = {key: stack.enter_context(stepping(python, order)) for key, order in peers.items()}
+        ours = ours_in_hall(Path(folder) / "hall.geojson")
+        yield runs | {
+            key: stack.enter_context(stepping(sys.executable, order)) for key, order in ours.items()
+        }
 
 
 def beside_peers(
@@ -201,13 +205,13 @@ def beside_peers(
     figures : dict
         Rates of the peers, and of ours with their ratios, steps with a collision, and targets.
     """
-    with _processes(python, peers) as processes:
-        for process in processes.values():
-            process.run(min(WARM_UP, window))
-        every: dict[Any, list[dict[str, float]]] = {key: [] for key in processes}
+    with _contenders(python, peers) as contenders:
+        for run in contenders.values():
+            run(min(WARM_UP, window))
+        every: dict[Any, list[dict[str, float]]] = {key: [] for key in contenders}
         for _ in range(rounds):
             for key in _in_turns(peers):
-                every[key].append(processes[key].run(window))
+                every[key].append(contenders[key](window))
             tell()
     rates = {key: [run["steps"] / run["seconds"] for run in runs] for key, runs in every.items()}
     return {

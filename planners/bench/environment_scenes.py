@@ -11,7 +11,7 @@ from shapely.geometry import LineString, Point, Polygon, box
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.maze import Maze
 
-__all__ = ["ENV_ID", "N_WALLS", "REACH", "arm_in_hall", "hall", "half_out"]
+__all__ = ["ENV_ID", "N_WALLS", "REACH", "arm_in_hall", "half_out", "hall"]
 
 ENV_ID = "hrsnake_env:HyperRedundantMaze-v0"
 

@@ -1,7 +1,7 @@
 """Random steps through an environment, counted and timed; as a script, a process that answers by lines.
 
-It needs Python and Gymnasium alone, so that it also runs where nothing of this project is installed. A line of
-JSON comes in, and one goes out: first `{"make": id, ...}`, then `{"run": seconds}` as often as is asked.
+It needs Python and Gymnasium alone, so that it also runs where nothing of this project is installed. A line
+of JSON comes in, and one goes out: first `{"make": id, ...}`, then `{"run": seconds}` as often as is asked.
 """
 
 from __future__ import annotations

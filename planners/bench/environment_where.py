@@ -148,9 +148,7 @@ def _watched() -> Iterator[Stopwatch]:
         yield watch
 
 
-def where(
-    links: Sequence[int], steps: int, rounds: int, tell: Tell = lambda: None
-) -> list[dict[str, Any]]:
+def where(links: Sequence[int], steps: int, rounds: int, tell: Tell = lambda: None) -> list[dict[str, Any]]:
     """Time all pieces of a step, in microseconds.
 
     Parameters
