@@ -1,9 +1,10 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+OLD := .venv-oldest
 INPUTS := pyproject.toml constraints.txt
 
-.PHONY: demo test notebooks kernels lint types contracts check format clean
+.PHONY: demo test oldest notebooks kernels lint types contracts check format clean
 
 ## demo: plan, check and simulate the paper's benchmark; writes demo/
 demo: $(VENV)/.core
@@ -27,6 +28,10 @@ kernels: $(VENV)/.all
 		tests/test_track.py::test_feeding_keeps_lengths_steps_and_the_track \
 		tests/test_track.py::test_hits_and_self_crossings_are_those_of_shapely
 
+## oldest: the environment's tests with the oldest versions that pyproject.toml allows
+oldest: $(OLD)/.all
+	$(OLD)/bin/python -m pytest tests/test_env.py tests/test_workers.py tests/test_reset_options.py tests/test_save_restore.py
+
 ## lint, types, contracts: what CI checks besides the tests
 lint: $(VENV)/.all
 	$(BIN)/ruff check .
@@ -46,7 +51,7 @@ format: $(VENV)/.all
 	$(BIN)/ruff format .
 
 clean:
-	rm -rf $(VENV) demo notebooks/build
+	rm -rf $(VENV) $(OLD) demo notebooks/build
 
 $(BIN)/python:
 	$(PYTHON) -c 'import sys; sys.exit("hrsnake needs Python 3.11 or newer; try: make demo PYTHON=python3.11" if sys.version_info < (3, 11) else 0)'
@@ -60,3 +65,8 @@ $(VENV)/.core: $(INPUTS) | $(BIN)/python
 $(VENV)/.all: $(INPUTS) | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev,rl]'
 	touch $@ $(VENV)/.core
+
+$(OLD)/.all: pyproject.toml constraints-oldest.txt
+	$(PYTHON) -m venv $(OLD)
+	$(OLD)/bin/python -m pip install --quiet --constraint constraints-oldest.txt --editable '.[rl,play]' pytest hypothesis
+	touch $@

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -58,13 +59,13 @@ class Bend:
     index: float
     wall: float | None = None
 
-    @property
+    @cached_property
     def setbacks(self) -> tuple[float, float]:
         """How far its corners reach into the legs before and behind it, from the centreline's corner."""
         cosine, twice = math.cos(self.turn), 2.0 * math.sin(self.turn)
         return abs(self.outlet - self.entry * cosine) / twice, abs(self.entry - self.outlet * cosine) / twice
 
-    @property
+    @cached_property
     def rooms(self) -> tuple[float, float]:
         """How far before and behind the inner corner the longest rod touches the outer walls."""
         angles = self.turn * PARTS

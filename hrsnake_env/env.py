@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import os
-from collections import OrderedDict
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,25 +13,20 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from hrsnake_env import task
-from hrsnake_env.arm import ArmSpec, FloatArray
+from hrsnake_env.arm import FloatArray
 from hrsnake_env.contacts import PinchReport
 from hrsnake_env.errors import InputError
-from hrsnake_env.geodesic import GeodesicDistance, look_ahead
+from hrsnake_env.geodesic import look_ahead
 from hrsnake_env.maze import Maze
-from hrsnake_env.observation import AHEAD, observation_space, write_observation
+from hrsnake_env.observation import AHEAD, observation_parts, observation_space, write_observation
 from hrsnake_env.options import ResetOptions
 from hrsnake_env.physics import CONTROL_TIMESTEP, Physics, PhysicsState
-from hrsnake_env.random_mazes import LINK_LENGTH, N_LINKS, N_TASKS, task_maze
 from hrsnake_env.rendering import HEIGHT, Frame
+from hrsnake_env.scenes import NO_TASK, Scene, Scenes
 from hrsnake_env.tally import Tally
 from hrsnake_env.view import View
 
 __all__ = ["EnvState", "HyperRedundantMazeEnv"]
-
-N_SCENES = 8
-"""So many mazes are kept ready, with their walls and distances."""
-
-NO_TASK = -1
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -46,16 +39,6 @@ class EnvState:
     physics: PhysicsState
     tally: Tally
     rng: dict[str, Any]
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _Scene:
-    """Hold a maze with what is computed for it once."""
-
-    maze: Maze
-    distance: GeodesicDistance
-    way: float
-    physics: Physics
 
 
 class HyperRedundantMazeEnv(gym.Env[Any, Any]):
@@ -72,10 +55,10 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
     `Box(-1, 1, (n_links + 1,), float32)`; larger actions are cut. Joints are counted from the base end,
     angles are counter-clockwise positive.
 
-    | number      | with `action="delta"`                                   | with `action="absolute"`                                       |
-    |-------------|---------------------------------------------------------|----------------------------------------------------------------|
-    | 0           | change of the feed's target, in 0.02 link lengths       | the feed's target: -1 is none of the arm, 1 all of it          |
-    | 1 ... n_links | change of each joint's target, in 0.05 rad            | each joint's target, in shares of the joint limit (or of pi)   |
+    | number        | with `action="delta"`                    | with `action="absolute"`                    |
+    |---------------|------------------------------------------|---------------------------------------------|
+    | 0             | change of the feed's target / 0.02 links | the feed's target: from -1, none, to 1, all |
+    | 1 ... n_links | change of each joint's target / 0.05 rad | each joint's target / joint limit (or pi)   |
 
     Absolute targets are approached by the changes that an action of 1 makes. Joints that have not passed the
     base stay straight, whatever their action: their angle is cut to 16 rad per link length that they are past
@@ -87,23 +70,27 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
     `observation="state"`: `Box(low, 1, (4 * n_links + 16,), float32)`; with `rays=True` 8 + 2 * n_links
     numbers more. Everything is cut to its bounds. The reach is the length of the arm.
 
-    | part          | number      | meaning                                                              | min | max |
-    |---------------|-------------|----------------------------------------------------------------------|-----|-----|
-    | feed          | 1           | length of arm past the base / reach                                  | 0   | 1   |
-    | joint_angles  | n_links     | relative to the previous link / joint limit (or pi)                  | -1  | 1   |
-    | target_errors | 1 + n_links | target minus feed and joint angles / largest change in a step        | -1  | 1   |
-    | speeds        | 1 + n_links | of feed and joint angles / largest change in a step                  | -1  | 1   |
-    | tip_position  | 2           | x and y from the base / reach                                        | -1  | 1   |
-    | tip_heading   | 2           | cosine and sine                                                      | -1  | 1   |
-    | clearances    | n_links     | of each link to the walls / link length                              | -1  | 1   |
-    | goal_offset   | 2           | x and y from the tip to the goal / reach                             | -1  | 1   |
-    | goal_distance | 1           | from the tip round the walls / the same from the base, halved        | 0   | 1   |
-    | ahead         | 6           | places 0.5, 1 and 2 link lengths ahead on the shortest way to the goal, forward and left of the tip, each / that length | -1  | 1   |
-    | tip_rays      | 8           | with `rays`: to the walls, from -105 to 105 degrees off the last link / 2 link lengths | 0   | 1   |
-    | side_rays     | 2 * n_links | with `rays`: to the right and the left of each joint / 2 link lengths; 1 in the feeder | 0   | 1   |
+    | part          | number      | meaning                                                 | min | max |
+    |---------------|-------------|---------------------------------------------------------|-----|-----|
+    | feed          | 1           | length of arm past the base / reach                     | 0   | 1   |
+    | joint_angles  | n_links     | relative to the previous link / joint limit (or pi)     | -1  | 1   |
+    | target_errors | 1 + n_links | target minus feed and angles / largest change in a step | -1  | 1   |
+    | speeds        | 1 + n_links | of feed and joint angles / largest change in a step     | -1  | 1   |
+    | tip_position  | 2           | x and y from the base / reach                           | -1  | 1   |
+    | tip_heading   | 2           | cosine and sine                                         | -1  | 1   |
+    | clearances    | n_links     | of each link to the walls / link length                 | -1  | 1   |
+    | goal_offset   | 2           | x and y from the tip to the goal / reach                | -1  | 1   |
+    | goal_distance | 1           | round the walls, from the tip / from the base, halved   | 0   | 1   |
+    | ahead         | 6           | places on the shortest way to the goal, see below       | -1  | 1   |
+    | tip_rays      | 8           | with `rays`: from the tip to the walls, see below       | 0   | 1   |
+    | side_rays     | 2 * n_links | with `rays`: from each joint to the right and left      | 0   | 1   |
+
+    The places ahead are 0.5, 1 and 2 link lengths along the way from the tip; of each, how far it is forward
+    and to the left of the tip, / that length. Rays are / 2 link lengths, as far as they see. Those of the
+    tip go from -105 to 105 degrees off the last link, in steps of 30; joints in the feeder see nothing.
 
     `observation="goal"`: a dictionary for hindsight replay. `observation` is the vector without goal_offset,
-    goal_distance and ahead, `achieved_goal` is tip_position and `desired_goal` the goal's place, scaled alike.
+    goal_distance and ahead, `achieved_goal` is tip_position and `desired_goal` the goal, scaled alike.
 
     `observation="image"`: the picture of `render`, `Box(0, 255, (image_size, image_size, 3), uint8)`.
 
@@ -111,11 +98,14 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
 
     The sum of three terms, which `info` holds one by one.
 
-    | term            | `reward_type="dense"`                                                      | `reward_type="sparse"` |
-    |-----------------|----------------------------------------------------------------------------|------------------------|
-    | reward_progress | by how much the way from the tip to the goal round the walls has become shorter, in link lengths, from -0.1 to 0.1 | 0 |
-    | reward_contact  | -0.2 (`contact_penalty`) in a step in which a link went deeper into a wall or another link than the pinch tolerance | the same |
-    | reward_goal     | 10 on success                                                              | 1 on success           |
+    | term            | `reward_type="dense"`                                   | `reward_type="sparse"` |
+    |-----------------|---------------------------------------------------------|------------------------|
+    | reward_progress | the way that has been made, see below, from -0.1 to 0.1 | 0                      |
+    | reward_contact  | -0.2 (`contact_penalty`) in a step with a collision     | the same               |
+    | reward_goal     | 10 on success                                           | 1 on success           |
+
+    Progress is by how much the shortest way from the tip to the goal round the walls has become shorter, in
+    link lengths. A collision is a link that is deeper in a wall or another link than the pinch tolerance.
 
     With `observation="goal"` the reward must be a function of the two goals, `compute_reward`: there
     reward_progress is minus the straight distance from the tip to the goal / reach (0 if sparse), and
@@ -125,43 +115,45 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
 
     The whole arm is in the feeder, at rest, with its tip at the base. `reset(options=...)` starts elsewhere:
 
-    | option         | meaning                                                                                    |
-    |----------------|--------------------------------------------------------------------------------------------|
-    | `maze`         | another maze for the same arm: a Maze, a name or a file                                    |
-    | `task_id`      | with `maze="random"`: which of the mazes of the split                                      |
-    | `goal`         | another goal (x, y), in maze units                                                         |
-    | `feed`         | length of arm past the base, in maze units                                                 |
-    | `joint_angles` | in rad, with `feed`                                                                        |
-    | `motion`       | anything with `feed` (n_poses,) and `joint_angles` (n_poses, n_links): start at a pose of it |
-    | `waypoint`     | which pose; by default the first                                                           |
-    | `state`        | from `get_state` or `snapshot`                                                             |
+    | option         | meaning                                                                 |
+    |----------------|-------------------------------------------------------------------------|
+    | `maze`         | another maze for the same arm: a Maze, a name or a file                 |
+    | `task_id`      | with `maze="random"`: which of the mazes of the split                   |
+    | `goal`         | another goal (x, y), in maze units                                      |
+    | `feed`         | length of arm past the base, in maze units                              |
+    | `joint_angles` | in rad, with `feed`                                                     |
+    | `motion`       | start at a pose of this; it has `feed` and `joint_angles` for each pose |
+    | `waypoint`     | which pose of the motion; by default the first                          |
+    | `state`        | from `get_state` or `snapshot`                                          |
 
     ## Episode End
 
     Termination: the tip has been within the goal's radius for `success_hold_steps` steps (success); or a link
-    has gone into something deeper than the pinch tolerance (unless `terminate_on_collision=False`); or the arm
+    has collided with something (unless `terminate_on_collision=False`); or the arm
     is jammed, with a link's end 0.1 link lengths from where it belongs or joined links 0.02 apart.
 
     Truncation: by the time limit of the registration, 10,000 steps for `HyperRedundantMaze-v0`.
 
     ## Info
 
-    The same keys from the reset on. Lengths are in maze units.
+    The same keys from the reset on. Lengths are in maze units, torques in link mass x link length^2 / s^2,
+    impulses in link mass x link length / s.
 
-    | key                                  | meaning                                                                |
-    |--------------------------------------|------------------------------------------------------------------------|
-    | success, is_success                  | whether the episode has ended in success                               |
-    | progress                             | share of the way to the goal that is done                              |
-    | feed, tip_distance, goal_distance    | length of arm past the base; tip to goal, straight and round the walls |
-    | clearance                            | smallest of all links, negative in a wall                              |
-    | pinches, collisions                  | links that did so in this step                                         |
-    | depth, impulse                       | largest in this step; impulse in link mass x link length / s           |
-    | joint_torques                        | mean of the step, shape (n_links,), in link mass x link length^2 / s^2 |
-    | node_error, drift                    | how far a link's end is from its place, and joined links apart         |
-    | task_id                              | which random maze, or -1                                               |
-    | reward_progress, reward_contact, reward_goal | the terms of the reward                                        |
-    | total_steps, total_reward, total_pinches, total_collisions | sums since the reset                             |
-    | worst_depth, worst_impulse           | largest since the reset                                                |
+    | key                                          | meaning                                               |
+    |----------------------------------------------|-------------------------------------------------------|
+    | success, is_success                          | whether the episode has ended in success              |
+    | progress                                     | share of the way to the goal that is done             |
+    | feed, tip_distance, goal_distance            | arm past the base; tip to goal, straight, round walls |
+    | clearance                                    | smallest of all links, negative in a wall             |
+    | pinches, collisions                          | links that pinch or collide in this step              |
+    | depth, impulse                               | largest in this step                                  |
+    | joint_torques                                | means of the step, shape (n_links,)                   |
+    | node_error, drift                            | link's end off its place; joined links apart          |
+    | task_id                                      | which random maze, or -1                              |
+    | reward_progress, reward_contact, reward_goal | the terms of the reward                               |
+    | total_steps, total_reward                    | since the reset                                       |
+    | total_pinches, total_collisions              | sums since the reset                                  |
+    | worst_depth, worst_impulse                   | largest since the reset                               |
 
     ## Arguments
 
@@ -255,44 +247,29 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         _check_one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
         _check_one_of("action", action, task.ACTIONS)
         _check_one_of("reward_type", reward_type, task.REWARDS)
-        _check_one_of("split", split, tuple(N_TASKS))
         _check_at_least("contact_penalty", contact_penalty, 0.0)
         _check_at_least("success_hold_steps", success_hold_steps, 1, whole=True)
         _check_at_least("image_size", image_size, 16, whole=True)
         if goal_radius is not None and not (_is_number(goal_radius) and 0.0 < goal_radius < math.inf):
             raise InputError(f"Expected a positive, finite goal_radius, or None, got {goal_radius!r}.")
-        self._random: dict[str, Any] | None = None
-        if isinstance(maze, str) and maze == "random":
-            link_length = LINK_LENGTH if link_length is None else link_length
-            n_links = N_LINKS if n_links is None else n_links
-            low, high = difficulty
-            self._random = {
-                "difficulty": (float(low), float(high)),
-                "link_length": link_length,
-                "n_links": n_links,
-            }
-            maze = task_maze(split, 0, **self._random)
-        self._split, self._goal_radius = split, goal_radius
-        self._physics_options = {
-            "substeps": substeps,
-            "torque_limit": torque_limit,
-            "actuation": actuation,
-        }
-        first = self._with_goal(maze if isinstance(maze, Maze) else Maze.load(maze), None)
-        distance = GeodesicDistance(first)
-        if link_length is None:
-            link_length = 1.5 * _mean_width(first)
-        arm = ArmSpec(
-            link_length=link_length, n_links=n_links, link_radius=link_radius, joint_limit=joint_limit
+        self._scenes = Scenes(
+            maze,
+            link_length=link_length,
+            n_links=n_links,
+            link_radius=link_radius,
+            joint_limit=joint_limit,
+            goal_radius=goal_radius,
+            split=split,
+            difficulty=difficulty,
+            physics={"substeps": substeps, "torque_limit": torque_limit, "actuation": actuation},
         )
-        first.check_arm(arm)
-        if n_links is None:
-            # A link more than a way 5 % longer takes: links cut corners less well than a string.
-            n_links = math.ceil(1.05 * distance(first.base_pose[:2]) / link_length) + 1
-        self.arm = dataclasses.replace(arm, n_links=n_links)
+        self.arm = self._scenes.arm
+        link_length, n_links = self.arm.link_length, int(self.arm.n_links or 0)
         self.render_mode = render_mode
         self.action_space = spaces.Box(-1.0, 1.0, (n_links + 1,), np.float32)
         self.observation_space = observation_space(observation, n_links, rays=rays, image_size=image_size)
+        parts = observation_parts(n_links, goal=observation == "state", rays=rays)
+        self._n_observed = sum(length for length, _ in parts.values())
         if observation == "goal":
             self.compute_reward = self.goal_reward  # its presence says that there is a goal
         self._mode, self._rays, self._image_size = observation, rays, image_size
@@ -312,13 +289,9 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         self._ahead = np.array(AHEAD) * link_length
         self._target, self._wanted = np.zeros(1 + n_links), np.zeros(1 + n_links)
         self._no_rays, self._places = np.zeros(0), np.zeros((len(AHEAD), 2))
-        size = (HEIGHT, HEIGHT) if self._random else None
-        self._view = View(size, fps=self.metadata["render_fps"])
+        self._view = View((HEIGHT, HEIGHT) if self._scenes.random else None, fps=self.metadata["render_fps"])
         self._eye = View((image_size, image_size), fps=self.metadata["render_fps"])
-        self._scenes: OrderedDict[Maze, _Scene] = OrderedDict()
-        self._task_id = NO_TASK if self._random is None else 0
-        self._first_maze = first
-        self._enter(first, distance)
+        self._enter(self._scenes.first, 0 if self._scenes.random else NO_TASK)
         self._start(0.0, np.zeros(n_links))
 
     # The Gymnasium interface
@@ -349,8 +322,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         if wanted.state is not None:
             self._return_to(wanted.state)
         else:
-            maze = self._wanted_maze(wanted)
-            self._enter(maze)
+            self._enter(*self._scenes.choose(wanted, self.np_random))
             self._start(wanted.feed, wanted.joint_angles)
         if self.render_mode == "human":
             self.render()
@@ -378,7 +350,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         if bad >= 0:
             raise InputError(f"Expected a finite action, got {values[bad]} at index {bad}.")
         self._target, self._wanted = self._wanted, self._target
-        self.physics.advance(self._target[0], self._target[1:])
+        self.physics.advance_to(self._target)
         terminated, reward = self._judge()
         if self.render_mode == "human":
             self.render()
@@ -412,8 +384,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             return self._eye.frame(self.physics)
         physics, goal = self.physics, self._mode == "state"
         senses = physics.sense()
-        shape = self.observation_space if goal else self.observation_space["observation"]  # type: ignore[index]
-        vector = np.empty(shape.shape, dtype=np.float32)  # type: ignore[arg-type]
+        vector = np.empty(self._n_observed, dtype=np.float32)
         write_observation(
             *senses,
             self._target,
@@ -509,60 +480,24 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
     def _return_to(self, state: Any) -> None:
         if not isinstance(state, EnvState):
             raise InputError(f"Expected a state from get_state or snapshot, got {type(state).__name__}.")
-        self._enter(state.maze)
+        self._enter(self._scenes.of(state.maze), state.task_id)
         self.physics.set_state(state.physics)
-        self._task_id = state.task_id
         self._target = state.target.copy()
         self._look_ahead()
         self._tally = state.tally.copy()
 
     # What it is made of
 
-    def _with_goal(self, maze: Maze, goal: FloatArray | None) -> Maze:
-        """Return a maze with the goal that is asked for."""
-        changes: dict[str, Any] = {} if goal is None else {"goal": goal}
-        if self._goal_radius is not None:
-            changes["goal_radius"] = self._goal_radius
-        return dataclasses.replace(maze, **changes) if changes else maze
-
-    def _wanted_maze(self, wanted: ResetOptions) -> Maze:
-        if wanted.task_id is not None and self._random is None:
-            raise InputError("Expected maze='random' for the reset option 'task_id', got another maze.")
-        maze, self._task_id = wanted.maze_given(), NO_TASK
-        if maze is None and self._random is not None:
-            n_tasks = N_TASKS[self._split]
-            task_id = int(self.np_random.integers(n_tasks)) if wanted.task_id is None else wanted.task_id
-            self._task_id, maze = task_id, task_maze(self._split, task_id, **self._random)
-        if maze is None:
-            maze = self._first_maze
-            return maze if wanted.goal is None else self._with_goal(maze, wanted.goal)
-        return self._with_goal(maze, wanted.goal)
-
-    def _enter(self, maze: Maze, distance: GeodesicDistance | None = None) -> None:
-        """Make a maze the present one; its walls and distances are computed when it is new."""
-        scene = self._scenes.get(maze)
-        if scene is None:
-            maze.check_arm(self.arm)
-            distance = distance or GeodesicDistance(maze)
-            scene = _Scene(
-                maze=maze,
-                distance=distance,
-                way=distance(maze.base_pose[:2]),
-                physics=Physics(maze, self.arm, **self._physics_options),
-            )
-            self._scenes[maze] = scene
-            if len(self._scenes) > N_SCENES:
-                self._scenes.popitem(last=False)
-        self._scenes.move_to_end(maze)
-        self._scene = scene
-        self._goal = (float(maze.goal[0]), float(maze.goal[1]))
+    def _enter(self, scene: Scene, task_id: int) -> None:
+        self._scene, self._task_id = scene, task_id
+        self._goal = (float(scene.maze.goal[0]), float(scene.maze.goal[1]))
 
     def _start(self, feed: float, joint_angles: FloatArray) -> None:
         physics = self.physics
         physics.reset(feed, joint_angles)
         self._target[:] = physics.target
         self._tally = Tally(distance=self._scene.way)
-        self._tally.distance = self._look_ahead()
+        self._tally.distance, self._tally.tip_distance = self._look_ahead(), self._tip_distance()
         if feed > 0.0:
             self._check_start()
 
@@ -576,7 +511,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
                     f"Expected a start clear of the walls, got link {contact.link} {-contact.clearance:.3g} "
                     f"{self.maze.units} deep in {what} at ({contact.point[0]:g}, {contact.point[1]:g})."
                 )
-        if self._tip_distance() <= self.maze.goal_radius:
+        if self._tally.tip_distance <= self.maze.goal_radius:
             raise InputError("Expected a start outside the goal's radius, got one with the tip at the goal.")
         self._tally.see(self.physics.pose_contacts)
 
@@ -591,7 +526,8 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             or physics.drift > task.JAM_DRIFT * length
         )
         failed = jammed or (tally.collided and self._terminate_on_collision)
-        at_goal = not failed and self._tip_distance() <= self.maze.goal_radius
+        tally.tip_distance = self._tip_distance()
+        at_goal = not failed and tally.tip_distance <= self.maze.goal_radius
         tally.steps_at_goal = tally.steps_at_goal + 1 if at_goal else 0
         tally.succeeded = tally.steps_at_goal >= self._success_hold_steps
         if self._mode == "goal":
@@ -645,7 +581,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             "is_success": tally.succeeded,
             "progress": 1.0 - tally.distance / self._scene.way,
             "feed": float(readings[0]),
-            "tip_distance": self._tip_distance(),
+            "tip_distance": tally.tip_distance,
             "goal_distance": tally.distance,
             "clearance": float(readings[5]),
             "pinches": tally.pinches,
@@ -664,11 +600,6 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             "worst_depth": tally.worst_depth,
             "worst_impulse": tally.worst_impulse,
         }
-
-
-def _mean_width(maze: Maze) -> float:
-    """Return the width of the corridor that has the maze's area and length of walls."""
-    return float(2.0 * maze.free_space.area / maze.free_space.length)
 
 
 def _check_one_of(what: str, value: Any, available: tuple[Any, ...]) -> None:

@@ -185,7 +185,7 @@ def _ways_from_bends(ways: Ways, ends: FloatArray) -> tuple[FloatArray, NDArray[
     """Return `Ways.lengths`, infinite where there is no way, and `Ways.onward`."""
     a, b = _bends_in_sight(ways, ends).T
     gaps = np.linalg.norm(ways.bends[a] - ways.bends[b], axis=1)
-    graph = csr_array((gaps, (a, b)), shape=(len(ends), len(ends)))
+    graph = csr_array((gaps, (a.astype(np.int32), b.astype(np.int32))), shape=(len(ends), len(ends)))
     lengths, onward = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
     return lengths, np.maximum(onward, 0).astype(np.int32)
 

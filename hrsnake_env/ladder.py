@@ -38,7 +38,7 @@ RIGHT_ANGLE = 2.0 * math.sqrt(2.0) * WIDTH
 """The longest rod that passes a right-angled bend, in px."""
 
 RODS = {"straight": math.inf, "bend": RIGHT_ANGLE, "u-turn": 440.0, "s-bend": RIGHT_ANGLE, "zigzag": 440.0}
-"""The longest rods that pass the shapes if their legs are long, in px; 440 is twice the width and the wall."""
+"""The longest rods that pass the shapes if their legs are long, in px; 440 is two widths and the wall."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +86,7 @@ def rung_maze(shape: str, link_length: float, *, name: str = "rung", longer: flo
         Factor by which the legs are longer that grow with the link.
     """
     legs = SHAPES[shape].split()
-    grown = [FIRST, *[INNER] * (len(legs) - 2), LAST] if len(legs) > 1 else [LAST]
+    grown = [FIRST, *[INNER] * (len(legs) - 2), LAST] if len(legs) > 1 else [INNER]
     lengths = [float(leg[1:] or longer * links * link_length) for leg, links in zip(legs, grown, strict=True)]
     lengths[-1] += WIDTH / 2  # the goal stands half a width before the end
     steps = np.array([DIRECTIONS[leg[0]] for leg in legs]) * np.array(lengths)[:, None]
@@ -115,22 +115,18 @@ def _papers(maze: str, n_links: int, longest_rod: float, role: str) -> Rung:
 RUNGS = (
     _short("straight", 130.0, 3, "A smoke test: feed, and arrive."),
     _short("bend", 170.0, 4, "One loose bend: the first task in which joints must turn."),
-    _short(
-        "bend", 340.0, 5, "One bend of medium tightness; a link that follows the centreline still passes."
-    ),
-    _short("u-turn", 132.0, 5, "A loose U-turn, learnt from scratch in seconds."),
-    _short("u-turn", 220.0, 5, "The first rung that keeps learners from scratch at half the way."),
-    _short("u-turn", 264.0, 5, "A U-turn just before links can no longer follow the centreline."),
-    _short("u-turn", 352.0, 5, "Links that follow the centreline hit the wall: here planning begins."),
-    _short("u-turn", 400.0, 5, "A tight U-turn: links pass with a tenth of their length to spare."),
+    _short("bend", 340.0, 5, "One bend whose inner corner links hit if they follow the path."),
+    _short("u-turn", 132.0, 5, "A loose U-turn: links that follow the path pass."),
+    _short("u-turn", 220.0, 5, "The first U-turn in which they do not: here planning begins."),
+    _short("u-turn", 264.0, 5, "A U-turn of medium tightness."),
+    _short("u-turn", 352.0, 5, "A tight U-turn: links have a fifth of the longest rod to spare."),
+    _short("u-turn", 400.0, 5, "A tighter one: a tenth."),
     _short("u-turn", 430.0, 5, "The paper's U-turn and link, with short legs: links pinch the walls."),
     _short("s-bend", 170.0, 6, "Two loose bends to opposite sides."),
     _short("s-bend", 340.0, 6, "Two bends, in which neighbouring links turn to opposite sides."),
-    _short(
-        "s-bend", 420.0, 5, "Nearly the longest link with a known motion: bends this close cost a quarter."
-    ),
+    _short("s-bend", 420.0, 5, "Nearly the longest link with a known motion: a quarter below the rod."),
     _short("zigzag", 132.0, 7, "Two loose U-turns to opposite sides."),
-    _short("zigzag", 352.0, 8, "Two U-turns to opposite sides in which links cannot follow the centreline."),
+    _short("zigzag", 352.0, 8, "Two tight U-turns to opposite sides."),
     _papers("fig19", 6, 440.0, "The paper's benchmark."),
     _papers("fig17b", 21, 242.0, "A tight U-turn, then a hall of pillars with many ways."),
     _papers("fig17c", 16, 297.6, "Rounded S-bends and a hall between them."),

@@ -10,7 +10,6 @@ import numpy as np
 
 from hrsnake_env.arm import ArmSpec, FloatArray, feeder_angle_limits
 from hrsnake_env.errors import InputError
-from hrsnake_env.maze import Maze
 
 __all__ = ["RESET_OPTIONS", "ResetOptions"]
 
@@ -76,12 +75,6 @@ class ResetOptions:
             joint_angles=angles,
             state=given.get("state"),
         )
-
-    def maze_given(self) -> Maze | None:
-        """Return the maze that is asked for, loaded."""
-        if self.maze is None or isinstance(self.maze, Maze):
-            return self.maze
-        return Maze.load(self.maze)
 
 
 def _refuse_both(given: Mapping[str, Any], key: str, *others: str) -> None:

@@ -256,6 +256,18 @@ class Physics:
         """
         self._move("advance", self._as_target(feed, joint_angles))
 
+    def advance_to(self, target: FloatArray) -> None:
+        """Move on as `advance` does, without a check.
+
+        Parameters
+        ----------
+        target : array, shape (1 + n_links,)
+            Feed and joint angles, finite, in maze units and rad; not kept.
+        """
+        end = target.copy()
+        end[0] *= self._scale
+        self._move("advance", end)
+
     def take_back(self) -> None:
         """Take the targets back to where the arm is: what walls have refused is forgotten."""
         self._move("take_back", None)
@@ -292,7 +304,7 @@ class Physics:
             return  # pymunk's own checks would end the process
         self._nodes, self._last_nodes = self._last_nodes, self._nodes
         self._space.substep = number
-        self._feed_links(float(target[0]))
+        self._feed_links(target.item(0))
         timestep = CONTROL_TIMESTEP / self.substeps
         if not self.kinematic and self._actuation == "computed_torque":
             drive(
@@ -323,17 +335,20 @@ class Physics:
 
     def _held(self, feed: float) -> int:
         """Return how many joints the feeder holds; `feed` in simulator units."""
-        return min(max(math.floor(self.n_links - feed / SIM_LINK) + 1, 0), self.n_links)
+        n_held = math.floor(self.n_links - feed / SIM_LINK) + 1
+        return self.n_links if n_held > self.n_links else max(n_held, 0)
 
     def _feed_links(self, feed: float) -> None:
         """Let links collide as soon as their tip end has passed the base."""
         n_held = self._held(feed)
         # Dynamic links are still where their last target has sent them.
-        self._space.n_held = n_held if self.kinematic else max(n_held, self._n_held)
-        first_active = max(n_held - 1, 0)
-        self._n_held = n_held
-        self._space.activate_links(first_active)
-        self._n_active = max(self._n_active, self.n_links - first_active)
+        self._space.n_held = n_held if self.kinematic or n_held > self._n_held else self._n_held
+        first_active = n_held - 1 if n_held > 0 else 0
+        if n_held != self._n_held:
+            self._n_held = n_held
+            self._space.activate_links(first_active)
+        if self.n_links - first_active > self._n_active:
+            self._n_active = self.n_links - first_active
 
     def _read(self) -> None:
         """Read all bodies, and compare them with where they belong."""
@@ -351,7 +366,7 @@ class Physics:
         self._log.begin_pose(self.pose)
         self._space.clearances.fill(math.inf)
         if self.finite:
-            self._tracking[:2] = 0.0
+            self._tracking[0] = self._tracking[1] = 0.0
         self._effort.fill(0.0)
         self._n_efforts = 0
         self._past_link_poses += self._n_active
@@ -532,7 +547,7 @@ class Physics:
     @property
     def finite(self) -> bool:
         """Whether all numbers are finite; a simulation that has broken down stands still."""
-        return math.isfinite(self._tracking[2])
+        return math.isfinite(self._tracking.item(2))
 
     @property
     def clearance(self) -> FloatArray:

@@ -42,14 +42,16 @@ EASIEST, TIGHTEST = 0.3, 0.9
 HALLS = 0.25
 """How often a maze ends in a hall, at difficulties over `MIXED`."""
 
-BASE, ENTRY, EXIT, BEHIND = 0.05, 1.6, 1.1, 0.3
-"""From the corridor's start to the base; straight ways from there to the first bend, and from the last one to
-the goal, at least; from the goal to the corridor's end. With less than 1.6 links in front of it a tight bend is
-closed: the first link is in the bend while the second one cannot leave the feeder's axis."""
+BASE, BEHIND = 0.05, 0.3
+"""From the corridor's start to the base, and from the goal to its end."""
+
+ENTRY, EXIT = 1.6, 1.1
+"""Least straight way from the base to the first bend, and from the last bend to the goal. A tight first bend
+that is closer is closed: one link is in it while the next one cannot leave the feeder's axis."""
 
 GOAL_RADIUS = 0.15
 
-MOUTH, AISLE, PILLARS = 0.3, 0.55, 6
+MOUTH, AISLE, PILLARS = 0.3, 0.35, 12
 """Straight way from the last bend to a hall; least width between its pillars and walls, for an index of 1;
 how often a pillar is drawn, and left out where it finds no place."""
 
@@ -62,6 +64,9 @@ LOOSE = 0.5
 
 LONGER = 1.05
 """An arm is this much longer than its way, since links zigzag in bends; and one link may stay outside."""
+
+ROUND = math.radians(200.0)
+"""Bends do not turn the corridor farther from its first heading, except by a U-turn: it would meet itself."""
 
 PER_BEND = 1.4
 """About the shortest way that a bend takes, in links."""
@@ -105,7 +110,7 @@ def index_of_difficulty(difficulty: float) -> float:
     """
     if not 0.0 <= difficulty <= 1.0:
         raise InputError(f"Expected a difficulty from 0 to 1, got {difficulty!r}.")
-    return EASIEST + difficulty * (TIGHTEST - EASIEST)
+    return (1.0 - difficulty) * EASIEST + difficulty * TIGHTEST
 
 
 def random_maze(
@@ -128,7 +133,7 @@ def random_maze(
     link_length : float
         In maze units. The maze has the same shape for any.
     n_links : int
-        The arm is at least one link longer than 1.05 times its way to the goal.
+        At least 5. The arm is at least one link longer than 1.05 times its way to the goal.
     name : str
         Of the maze.
 
@@ -144,9 +149,10 @@ def random_maze(
     """
     arm, index = ArmSpec(link_length=link_length, n_links=n_links), index_of_difficulty(difficulty)
     rng, longest = np.random.default_rng(seed), (n_links - 1) / LONGER
-    with_hall = bool(difficulty > MIXED and rng.random() < HALLS)
-    most = max(int((longest - ENTRY - EXIT) / PER_BEND) - with_hall, 1)
-    for n_bends in range(1 + round(difficulty * (most - 1)), 0, -1):
+    hall_wanted = bool(difficulty > MIXED and rng.random() < HALLS)
+    most = max(int((longest - ENTRY - EXIT) / PER_BEND) - hall_wanted, 1)
+    wanted = 1 + round(difficulty * (most - 1))
+    for n_bends, with_hall in [*((k, hall_wanted) for k in range(wanted, 0, -1)), (1, False)]:
         for _ in range(DRAWS if n_bends > 1 else 25 * DRAWS):
             bends = draw_bends(rng, n_bends, index, difficulty)
             hall = _draw_hall(rng, index) if with_hall else None
@@ -170,6 +176,8 @@ def task_maze(
     n_links: int = N_LINKS,
 ) -> Maze:
     """Return the maze of a task, whose difficulty is drawn from a range by the task's own seed.
+
+    It bears the task's name; under that name `Maze.load` gives the maze for the default arm and range.
 
     Parameters
     ----------
@@ -229,10 +237,13 @@ def draw_train_maze(
 def _draw_sides(rng: np.random.Generator, bends: list[Bend]) -> Iterator[FloatArray]:
     """Yield to which side each bend turns: 1 to the left, -1 to the right."""
     for _ in range(SIDES if bends else 0):
-        sides = rng.choice([-1.0, 1.0], len(bends))
+        sides, heading = rng.choice([-1.0, 1.0], len(bends)), 0.0
         for k, bend in enumerate(bends):
             if bend.wall is not None:
                 sides[k] = sides[k - 1]
+            elif abs(heading + sides[k] * bend.turn) > ROUND:
+                sides[k] *= -1.0
+            heading += sides[k] * bend.turn
         yield sides
 
 
@@ -240,10 +251,8 @@ def _lengths(bends: list[Bend], sides: FloatArray, slack: FloatArray, with_hall:
     """Return the length of each leg between the centreline's corners, in links."""
     between = [BASE + ENTRY + slack[0]]
     for k in range(1, len(bends)):
-        wall = bends[k].wall
-        between.append(
-            _apart(bends[k - 1], bends[k], sides[k - 1] != sides[k]) + slack[k] if wall is None else wall
-        )
+        wall, alternating = bends[k].wall, bool(sides[k - 1] != sides[k])
+        between.append(wall or _apart(bends[k - 1], bends[k], alternating) + slack[k])
     between.append(MOUTH if with_hall else EXIT + slack[-1] + BEHIND)
     before = [*(bend.setbacks[0] for bend in bends), 0.0]
     behind = [0.0, *(bend.setbacks[1] for bend in bends)]
@@ -267,13 +276,13 @@ def _way(lengths: FloatArray, hall: Hall | None) -> float:
 def _draw_hall(rng: np.random.Generator, index: float) -> Hall:
     """Draw a hall between whose pillars a rod has more room than in the bends."""
     gap = AISLE / index
-    length, width = 2.0 * gap + rng.uniform((0.6, 0.4), (1.2, 0.9))
+    length, width = gap * rng.uniform((3.0, 2.0), (4.0, 3.0)) + rng.uniform(0.5, 0.9, 2)
     across = 0.5 * width - 2.0 * GOAL_RADIUS
     goal = np.array([length - 2.0 * GOAL_RADIUS, rng.uniform(-across, across)])
     pillars: list[FloatArray] = []
     kept = [(goal, 2.0 * GOAL_RADIUS - gap)]
     for _ in range(PILLARS):
-        radius = rng.uniform(0.12, 0.25)
+        radius = rng.uniform(0.12, 0.35)
         reach = np.array([length, width]) - 2.0 * (gap + radius)
         place = np.array([0.5 * length, 0.0]) + rng.uniform(-0.5, 0.5, 2) * np.maximum(reach, 0.0)
         n = int(rng.integers(4, 9))

@@ -14,7 +14,7 @@ __all__ = ["ENVIRONMENTS", "register_environments"]
 ENTRY_POINT = "hrsnake_env.env:HyperRedundantMazeEnv"
 
 STEPS_PER_LINK = 200
-"""Time limit of a task. Feeding one link takes 50 steps, and the tightest planned motions three times that."""
+"""Time limit of a task. Feeding one link takes 50 steps, planned motions at most twice that."""
 
 
 def _task_name(maze: str) -> str:

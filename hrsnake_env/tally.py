@@ -22,11 +22,14 @@ class Tally:
     ----------
     distance : float
         From the tip to the goal, round the walls.
+    tip_distance : float
+        The same, straight.
     steps_at_goal : int
         So many steps in a row the tip has been at the goal.
     """
 
     distance: float
+    tip_distance: float = 0.0
     steps_at_goal: int = 0
     succeeded: bool = False
     collided: bool = False

@@ -90,7 +90,7 @@ def goal_reward_terms(
     collided: NDArray[np.bool_],
     contact_penalty: float,
 ) -> dict[str, Any]:
-    """Return the terms of the reward of the mode "goal": functions of where the tip is and where it should be.
+    """Return the terms of the reward of the mode "goal": functions of where the tip is and should be.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.task import FEED_STEP, JOINT_STEP
 from planners.planning import plan
-from planners.problem import Motion, PlanningResult, PlanningStatus
+from planners.problem import Motion, PlanningResult
 
 __all__ = ["PlannedPolicy", "PlanningPolicy", "actions_of"]
 
@@ -51,7 +51,7 @@ def actions_of(
     parts = np.maximum(np.ceil(np.abs(changes / steps).max(axis=1) - 1e-9), 1.0).astype(int)
     changes = np.repeat(changes / parts[:, None], parts, axis=0)
     if action == "delta":
-        return changes / steps
+        return np.asarray(changes / steps)
     number = np.concatenate([np.arange(n) for n in parts]) - np.repeat(parts, parts) + 1
     targets = np.repeat(poses[1:], parts, axis=0) + number[:, None] * changes
     reach = motion.n_links * motion.link_length
@@ -145,14 +145,14 @@ class PlanningPolicy:
 
     Attributes
     ----------
-    statuses : list of PlanningStatus
-        Of the plans, in the order of the episodes.
+    results : list of PlanningResult
+        Of every maze that was planned in, in order.
     """
 
     def __init__(self, env: Any, planner: str = "auto") -> None:
         self.env, self.planner = env, planner
-        self.statuses: list[PlanningStatus] = []
-        self._results: dict[bytes, PlanningResult] = {}
+        self.results: list[PlanningResult] = []
+        self._known: dict[bytes, PlanningResult] = {}
         self._policies: dict[int, PlannedPolicy | None] = {}
 
     def predict(
@@ -179,10 +179,10 @@ class PlanningPolicy:
     def _plan(self, k: int) -> PlannedPolicy | None:
         maze, arm, action = (self._attribute(name, k) for name in ("maze", "arm", "action_mode"))
         key = maze.free_space.wkb + np.array([*maze.base_pose, *maze.goal, maze.goal_radius]).tobytes()
-        if key not in self._results:
-            self._results[key] = plan(maze, arm, planner=self.planner, explain=False)
-        result = self._results[key]
-        self.statuses.append(result.status)
+        if key not in self._known:
+            self._known[key] = plan(maze, arm, planner=self.planner, explain=False)
+            self.results.append(self._known[key])
+        result = self._known[key]
         if result.motion is None:
             return None
         return PlannedPolicy(result.motion, action=action, joint_limit=arm.joint_limit)
@@ -204,6 +204,6 @@ def _batch_shape(observation: Any) -> tuple[int, ...]:
     """Return () for one observation, (n_envs,) for a batch; dictionaries go by their vector."""
     if isinstance(observation, Mapping):
         observation = observation["observation"]
-    shape = np.shape(observation)
+    shape: tuple[int, ...] = np.shape(observation)
     one = 1 if len(shape) <= 2 else 3  # a vector or a picture
     return shape[: len(shape) - one]

@@ -16,9 +16,9 @@ from hrsnake_env import ArmSpec, InputError, Maze
 from hrsnake_env.arm import FEEDER_RELEASE, feeder_angle_limits
 from hrsnake_env.env import HyperRedundantMazeEnv
 from hrsnake_env.observation import observation_names, observation_parts
-from hrsnake_env.pictures import MazePicture
 from hrsnake_env.options import RESET_OPTIONS
 from hrsnake_env.physics import RAY_REACH
+from hrsnake_env.pictures import MazePicture
 from hrsnake_env.task import (
     CONTACT_PENALTY,
     FEED_STEP,

@@ -218,7 +218,6 @@ def test_a_wrapper_collects_a_frame_for_the_reset_and_each_step():
 
 
 def test_an_episode_becomes_a_video(tmp_path):
-    pytest.importorskip("moviepy")
     env = gym.make(ID, maze="fig19", link_length=430.0, render_mode="rgb_array")
     env = gym.wrappers.RecordVideo(env, str(tmp_path / "videos"), episode_trigger=lambda episode: True)
     env.reset()

@@ -122,7 +122,8 @@ def test_a_thousand_resets_never_start_in_success():
     [
         (
             {"pose": 1},
-            "Unknown reset option 'pose'. Available: maze, task_id, goal, feed, joint_angles, motion, waypoint, state.",
+            "Unknown reset option 'pose'. Available: maze, task_id, goal, feed, joint_angles, motion, "
+            "waypoint, state.",
         ),
         ({"maze": "fig20"}, "Unknown maze 'fig20'. Available: fig19, "),
         ({"task_id": 3}, "Expected maze='random' for the reset option 'task_id', got another maze."),

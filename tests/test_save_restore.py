@@ -70,10 +70,7 @@ def test_every_way_of_keeping_a_state_is_exact(way, arguments):
     env.reset(seed=3)
     actions = actions_for(env, 160, seed=2)
     rollout(env, actions[:80])
-    if way == "snapshot":
-        state = env.snapshot()
-    else:
-        state = env.get_state()
+    state = env.snapshot() if way == "snapshot" else env.get_state()
     other = {
         "pickled env": lambda: pickle.loads(pickle.dumps(env)),
         "deep copy": lambda: copy.deepcopy(env),

@@ -33,7 +33,7 @@ PIECES: dict[str, tuple[str, ...]] = {
         f"{_PHYSICS}.pymunk.batch.{name}" for name in ("get_space_bodies", "set_space_bodies")
     ),
     "force and reading kernels": tuple(f"{_PHYSICS}.{name}" for name in ("drive", "read_links", "divide")),
-    "physics glue": (f"{_PHYSICS}.Physics.advance", f"{_PHYSICS}.Physics.take_back"),
+    "physics glue": (f"{_PHYSICS}.Physics.advance_to", f"{_PHYSICS}.Physics.take_back"),
     "senses": (f"{_PHYSICS}.read_arm",),
     "geodesic": (f"{_ENV}.look_ahead",),
     "observation": (f"{_CLASS}.observe", f"{_ENV}.write_observation"),
