@@ -26,6 +26,7 @@ TINY = dataclasses.replace(
     window=0.02,
     rounds=1,
     links=(12,),
+    where_rounds=1,
     where_steps=60,
     n_envs=2,
     random_mazes=("straight", "random"),

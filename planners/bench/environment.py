@@ -45,8 +45,8 @@ class EnvironmentSizes:
         Rounds, in which all take turns.
     links : tuple of int
         Arms whose steps are taken apart.
-    where_steps : int
-        Steps that are taken apart in each round.
+    where_rounds, where_steps : int
+        How often steps are taken apart, and how many; many short rounds, of which one is hardly disturbed.
     mazes : tuple of str
         Keys of `PAPER_LINK_LENGTHS`, for planned episodes.
     runs : int
@@ -62,6 +62,7 @@ class EnvironmentSizes:
     window: float
     rounds: int
     links: tuple[int, ...]
+    where_rounds: int
     where_steps: int
     mazes: tuple[str, ...]
     runs: int
@@ -74,7 +75,8 @@ FULL = EnvironmentSizes(
     window=1.0,
     rounds=9,
     links=(12, 45),
-    where_steps=10_000,
+    where_rounds=40,
+    where_steps=1000,
     mazes=("fig19", "fig17a"),
     runs=5,
     n_envs=8,
@@ -87,6 +89,7 @@ QUICK = EnvironmentSizes(
     window=0.1,
     rounds=3,
     links=(12, 45),
+    where_rounds=5,
     where_steps=500,
     mazes=("fig19",),
     runs=1,
@@ -162,8 +165,8 @@ def _measure(
             with bar(part, rounds, quiet) as tell:
                 return beside_peers(python, window, rounds, tell)
         case "where":
-            with bar(part, len(sizes.links) * (rounds + 1), quiet) as tell:
-                return where(sizes.links, sizes.where_steps, rounds, tell)
+            with bar(part, len(sizes.links) * (sizes.where_rounds + 1), quiet) as tell:
+                return where(sizes.links, sizes.where_steps, sizes.where_rounds, tell)
         case "resets":
             with bar(part, rounds, quiet) as tell:
                 return resets(window, rounds, tell)

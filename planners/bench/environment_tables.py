@@ -53,9 +53,9 @@ def _peers(data: Mapping[str, Any]) -> Iterator[str]:
 
 def _where(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     yield (
-        f"**where** the time of a step goes, in us, with 4 substeps, medians of {rows[0]['rounds']} rounds "
-        f"of {rows[0]['steps']} steps. Pieces are timed in running episodes, less what timing costs; `whole` "
-        "is the same episodes with nothing timed inside."
+        f"**where** the time of a step goes, in us, with 4 substeps; the fastest of {rows[0]['rounds']} "
+        f"rounds of {rows[0]['steps']} steps. Pieces are timed in running episodes, less what timing costs; "
+        "`whole` is the same episodes with nothing timed inside."
     )
     yield ""
     head = ("piece", *(f"{row['n_links']} links" for row in rows))

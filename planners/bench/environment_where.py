@@ -11,7 +11,6 @@ from typing import Any
 from unittest import mock
 
 import gymnasium as gym
-import numpy as np
 
 from planners.bench.environment_scenes import ENV_ID, arm_in_hall, half_out, hall
 from planners.bench.environment_stepper import HOLD
@@ -69,42 +68,40 @@ class Stopwatch:
     def __init__(self, root: str) -> None:
         self.root = root
         self.seconds: dict[str, float] = {}
-        self.calls: dict[str, int] = {}
-        self.inside: dict[str, int] = {}
+        self.calls: dict[str, float] = {}
+        self.inside: dict[str, float] = {}
         self.total = 0.0
-        self._open: list[list[Any]] = []
+        self._open: list[list[float]] = []
 
     def timed(self, piece: str, function: Callable[..., Any]) -> Callable[..., Any]:
         """Return the function, timed as a part of a piece."""
-        for count in (self.seconds, self.calls, self.inside):
+        seconds, calls, inside = self.seconds, self.calls, self.inside
+        for count in (seconds, calls, inside):
             count.setdefault(piece, 0)
         open_, clock, is_root = self._open, time.perf_counter, piece == self.root
 
         @functools.wraps(function)
-        def run(*args: Any, **named: Any) -> Any:
+        def run(*args: Any) -> Any:
             if not (open_ or is_root):
-                return function(*args, **named)
-            frame = [piece, 0.0]
+                return function(*args)
+            frame = [0.0, 0.0]  # seconds and calls of pieces inside
             open_.append(frame)
             start = clock()
-            try:
-                return function(*args, **named)
-            finally:
-                self._end(frame, clock() - start)
+            result = function(*args)
+            spent = clock() - start
+            open_.pop()
+            seconds[piece] += spent - frame[0]
+            calls[piece] += 1
+            inside[piece] += frame[1]
+            if open_:
+                above = open_[-1]
+                above[0] += spent
+                above[1] += 1
+            else:
+                self.total += spent
+            return result
 
         return run
-
-    def _end(self, frame: list[Any], spent: float) -> None:
-        piece, within = frame
-        self._open.pop()
-        self.seconds[piece] += spent - within
-        self.calls[piece] += 1
-        if self._open:
-            above = self._open[-1]
-            above[1] += spent
-            self.inside[above[0]] += 1
-        else:
-            self.total += spent
 
     def corrected(self) -> dict[str, float]:
         """Return the seconds of the pieces, without what timing them has cost."""
@@ -115,7 +112,7 @@ class Stopwatch:
         }
 
 
-def _nothing() -> None:
+def _nothing(*args: Any) -> None:
     pass
 
 
@@ -125,9 +122,9 @@ def _cost_of_timing() -> tuple[float, float]:
     watch = Stopwatch("caller")
     timed = watch.timed("called", _nothing)
 
-    def calls(function: Callable[[], None]) -> None:
-        for _ in range(CALIBRATION):
-            function()
+    def calls(function: Callable[..., None]) -> None:
+        for number in range(CALIBRATION):
+            function(watch, timed, number, CALIBRATION)
 
     start = time.perf_counter()
     calls(_nothing)
@@ -158,7 +155,7 @@ def where(links: Sequence[int], steps: int, rounds: int, tell: Tell = lambda: No
     steps : int
         In each round.
     rounds : int
-        So often; medians are returned.
+        So often; those of the fastest are returned, which other work on the machine disturbs least.
     tell : callable
         Called after each round.
 
@@ -181,14 +178,14 @@ def _where(n_links: int, steps: int, rounds: int, tell: Tell) -> dict[str, Any]:
         outside = spent - watch.total - watch.calls[watch.root] * sum(_cost_of_timing())
         every.append({**pieces, REST: max(outside, 0.0) / steps * 1e6})
         tell()
-    medians = {piece: float(np.median([row[piece] for row in every[1:]])) for piece in every[0]}
+    least = min(every[1:], key=lambda pieces: sum(pieces.values()))
     return {
         "n_links": n_links,
         "steps": steps,
         "rounds": rounds,
-        "pieces": medians,
-        "sum": sum(medians.values()),
-        "whole": float(np.median(wholes[1:])),
+        "pieces": least,
+        "sum": sum(least.values()),
+        "whole": min(wholes[1:]),
     }
 
 
