@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import multiprocessing
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -105,7 +106,10 @@ def _many(step: Callable[[Any], Any], space: gym.Space[Any], n_envs: int) -> Run
 
 @contextmanager
 def _gymnasium(mode: str, n_envs: int) -> Iterator[Run]:
-    env = gym.make_vec(VECTOR_ID, num_envs=n_envs, vectorization_mode=mode)
+    # As stable-baselines3 starts its workers: a fork would inherit the locks of this process's threads.
+    start = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+    how = {"context": start} if mode == "async" else {}
+    env = gym.make_vec(VECTOR_ID, num_envs=n_envs, vectorization_mode=mode, vector_kwargs=how)
     try:
         env.reset(seed=0)
         yield _many(env.step, env.single_action_space, n_envs)
