@@ -6,6 +6,7 @@ that is not clean. `--json` prints one JSON object instead of tables.
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import os
@@ -365,6 +366,51 @@ def bench_paper_command(
     sizes = paper.QUICK if quick else paper.FULL
     chosen = _parts(parts, paper.PARTS, out)
     _publish(paper.run_paper(sizes, parts=chosen, quiet=as_json), paper_markdown, out, as_json)
+
+
+@bench_app.command("env")
+def bench_env_command(
+    quick: Annotated[bool, typer.Option("--quick", help="Shorter windows, fewer mazes and steps.")] = False,
+    parts: Annotated[str, typer.Option("--parts", help="Some of the parts, as peers,where.")] = "",
+    random_steps: Annotated[
+        int | None, typer.Option("--random-steps", min=1, help="Of all random policies together.")
+    ] = None,
+    peers_python: Annotated[
+        Path | None, typer.Option("--peers-python", help="A Python with gym-pusht and MuJoCo.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="Write all figures (.json), and random runs to go on from (.jsonl)."),
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", help="Draw where a step's time goes (.png, .svg, .pdf).")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure the environment: speed beside peers, a step's pieces, resets, vectors, random policies."""
+    from planners.bench import environment
+    from planners.bench.environment_tables import environment_markdown
+    from planners.bench.records import write_results
+
+    _check_output(picture, PICTURES)
+    sizes = environment.QUICK if quick else environment.FULL
+    if random_steps is not None:
+        sizes = dataclasses.replace(sizes, random_steps=random_steps)
+    results = environment.run_environment(
+        sizes,
+        parts=_parts(parts, environment.PARTS, out),
+        peers=peers_python,
+        rows=None if out is None else out.with_suffix(".jsonl"),
+        keep=lambda done: None if out is None else write_results(done, out),
+        quiet=as_json,
+    )
+    if picture is not None and "where" in results:
+        from planners.bench.environment_chart import draw_where
+
+        draw_where(results["where"], picture)
+    _publish(results, environment_markdown, out, as_json)
+    if "stopped" in results:
+        raise typer.Exit(INTERRUPTED)
 
 
 def main() -> None:
