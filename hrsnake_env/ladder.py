@@ -117,7 +117,12 @@ RUNGS = (
     _short("bend", 170.0, 4, "One loose bend: the first task in which joints must turn."),
     _short("bend", 340.0, 5, "One bend whose inner corner links hit if they follow the path."),
     _short("u-turn", 132.0, 5, "A loose U-turn: links that follow the path pass."),
-    _short("u-turn", 220.0, 5, "The first U-turn that links which follow the path do not pass: here planning begins."),
+    _short(
+        "u-turn",
+        220.0,
+        5,
+        "The first U-turn that links which follow the path do not pass: here planning begins.",
+    ),
     _short("u-turn", 264.0, 5, "A U-turn of medium tightness."),
     _short("u-turn", 352.0, 5, "A tight U-turn: links have a fifth of the longest rod to spare."),
     _short("u-turn", 400.0, 5, "A tighter U-turn: links have a tenth of the longest rod to spare."),
