@@ -98,25 +98,29 @@ class ContactLog:
         self.pose = 0
         self._done: list[Contact] = []
         self._current: dict[ContactKey, _Entry] = {}
+        self._closed: tuple[Contact, ...] | None = ()
 
     def copy(self) -> ContactLog:
         """Return a log that goes on by itself."""
         log = ContactLog(self.tolerance)
         log.pose, log._done = self.pose, self._done.copy()
         log._current = {key: dataclasses.replace(entry) for key, entry in self._current.items()}
+        log._closed = self._closed
         return log
 
     def begin_pose(self, pose: int) -> None:
         """Close the records of the last pose."""
         if self._current:
-            self._done.extend(self._close())
+            self._done.extend(self.current)
             self._current.clear()
+            self._closed = ()
         self.pose = pose
 
     def touch(
         self, key: ContactKey, substep: int, wall: int, point: Place, clearance: float, impulse: float
     ) -> None:
         """Record that a contact has been seen, `wall` being -1 for another link."""
+        self._closed = None
         entry = self._current.get(key)
         if entry is None:
             self._current[key] = _Entry(substep, wall, point, clearance, impulse)
@@ -128,12 +132,14 @@ class ContactLog:
     @property
     def contacts(self) -> tuple[Contact, ...]:
         """All contacts so far, in the order of poses."""
-        return (*self._done, *self._close())
+        return (*self._done, *self.current)
 
     @property
     def current(self) -> tuple[Contact, ...]:
         """The contacts of the present pose."""
-        return tuple(self._close()) if self._current else ()
+        if self._closed is None:
+            self._closed = tuple(self._close())
+        return self._closed
 
     def _close(self) -> Iterable[Contact]:
         # What is solid behind the surface matters where the surface itself has not told of a collision.

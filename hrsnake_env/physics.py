@@ -19,7 +19,7 @@ from hrsnake_env.dynamics import divide, drive, place_links, read_links, step_ta
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from hrsnake_env.sensing import N_READINGS, N_TIP_RAYS, Senses, cast_rays, read_arm
-from hrsnake_env.space import SIM_LINK, TOLERANCE, ArmSpace
+from hrsnake_env.space import SIM_LINK, TOLERANCE, ArmSpace, WallShapes
 from hrsnake_env.walls import Frame, has_thin_walls, wall_pieces
 
 __all__ = ["CONTROL_TIMESTEP", "RAY_REACH", "Physics", "PhysicsState", "simulate"]
@@ -154,6 +154,7 @@ class Physics:
             [(*piece.start, *piece.end) for piece in self._pieces if piece.radius == 0.0]
         )
         self._largest_move = SIM_LINK * (THIN_MOVE if has_thin_walls(self._pieces, SIM_LINK) else THICK_MOVE)
+        self._wall_shapes = WallShapes(self._pieces)
         self._allocate()
         self.reset()
 
@@ -228,7 +229,7 @@ class Physics:
         build = placed_chain if self.kinematic else ACTUATIONS[self._actuation]
         self._chain = build(self.n_links, SIM_LINK)
         self._space = ArmSpace(
-            self._pieces,
+            self._wall_shapes,
             self._chain,
             start.links,
             self._radius,

@@ -13,7 +13,7 @@ from hrsnake_env.arm import FloatArray
 from hrsnake_env.contacts import PINCH_TOLERANCE, ContactKey, ContactLog, Place
 from hrsnake_env.walls import Frame, WallPiece
 
-__all__ = ["SIM_LINK", "TOLERANCE", "ArmSpace"]
+__all__ = ["SIM_LINK", "TOLERANCE", "ArmSpace", "WallShapes"]
 
 SIM_LINK = 230.0
 """Length of a link in simulator units, whatever the maze's: pymunk's tolerances then always mean the same."""
@@ -26,6 +26,42 @@ EVERYTHING = pymunk.ShapeFilter.ALL_MASKS()
 IN_FEEDER = pymunk.ShapeFilter(mask=0)
 
 
+class WallShapes:
+    """Hold the walls for pymunk: made once, they go from each space to the next.
+
+    Walls have no memory, unlike bodies and constraints, so that a space with them is as good as new.
+
+    Parameters
+    ----------
+    pieces : sequence of WallPiece
+        In simulator units.
+    """
+
+    def __init__(self, pieces: Sequence[WallPiece]) -> None:
+        # Not the space's own static body: a joint's anchor would switch off its contacts.
+        self._body = pymunk.Body(body_type=pymunk.Body.STATIC)
+        self._space: pymunk.Space | None = None
+        self.pieces: dict[pymunk.Shape, tuple[WallPiece, float]] = {}
+        """What each shape stands for, and how much farther off than its piece's surface it seems."""
+        category = pymunk.ShapeFilter(categories=WALL_CATEGORY)
+        for piece in pieces:
+            # No `set_neighbors`: it drops contacts at the ends of walls (measured: of 18,771 links at or
+            # across the walls of fig19, 1,427 went unnoticed with it, and none without).
+            # What is solid behind the surface begins two tolerances below it, and so is touched by a
+            # collision alone: a pinch is seen once.
+            radius = max(piece.radius - 2.0 * TOLERANCE, 0.0)
+            shape = pymunk.Segment(self._body, piece.start, piece.end, radius)
+            shape.collision_type, shape.filter = WALL, category
+            self.pieces[shape] = (piece, TOLERANCE - (piece.radius - radius))
+
+    def enter(self, space: pymunk.Space) -> None:
+        """Stand in a space, and no longer in the last one."""
+        if self._space is not None:
+            self._space.remove(*self.pieces, self._body)
+        space.add(self._body, *self.pieces)
+        self._space = space
+
+
 class ArmSpace:
     """Hold a fresh pymunk space with an arm among walls, and record its contacts.
 
@@ -34,8 +70,8 @@ class ArmSpace:
 
     Parameters
     ----------
-    pieces : sequence of WallPiece
-        The walls, in simulator units.
+    wall_shapes : WallShapes
+        The walls.
     chain : Chain
         The arm's links and joints.
     links : array, shape (n_links, 6)
@@ -52,7 +88,7 @@ class ArmSpace:
 
     def __init__(
         self,
-        pieces: Sequence[WallPiece],
+        wall_shapes: WallShapes,
         chain: Chain,
         links: FloatArray,
         radius: float,
@@ -74,17 +110,19 @@ class ArmSpace:
         self._error: Exception | None = None
         self._masses = [link.mass for link in chain.links]
         self._links: dict[pymunk.Shape, int] = {}
-        self._walls: dict[pymunk.Shape, tuple[WallPiece, float]] = {}
+        self._walls = wall_shapes.pieces
+        self._pressed: dict[tuple[pymunk.Shape, pymunk.Shape], tuple[ContactKey, int, Place, float]] = {}
         for k, state in enumerate(links.tolist()):
             self._add_link(k, chain.links[k], state)
         self.space.add(*chain.rest)
-        for piece in pieces:
-            self._add_wall(piece)
-        self.space.on_collision(LINK, WALL, pre_solve=self._before_wall, post_solve=self._after_wall)
-        self.space.on_collision(LINK, LINK, pre_solve=self._before_link, post_solve=self._after_link)
+        wall_shapes.enter(self.space)
+        self.space.on_collision(LINK, WALL, pre_solve=self._before_wall, post_solve=self._after)
+        self.space.on_collision(LINK, LINK, pre_solve=self._before_link, post_solve=self._after)
 
     def step(self, timestep: float) -> None:
         """Simulate one substep."""
+        if self._pressed:
+            self._pressed.clear()
         self.space.step(timestep)
         if self._error is not None:
             raise RuntimeError("A contact could not be recorded.") from self._error
@@ -111,29 +149,11 @@ class ArmSpace:
         self.space.add(body, shape)
         self._links[shape] = k
 
-    def _add_wall(self, piece: WallPiece) -> None:
-        # No `set_neighbors`: it drops contacts at the ends of walls (measured: of 18,771 links at or across
-        # the walls of fig19, 1,427 went unnoticed with it, and none without).
-        # What is solid behind the surface begins two tolerances below it, and so is touched by a collision
-        # alone: a pinch is seen once.
-        radius = max(piece.radius - 2.0 * TOLERANCE, 0.0)
-        shape = pymunk.Segment(self.space.static_body, piece.start, piece.end, radius)
-        shape.collision_type = WALL
-        shape.filter = pymunk.ShapeFilter(categories=WALL_CATEGORY)
-        self.space.add(shape)
-        self._walls[shape] = (piece, TOLERANCE - (piece.radius - radius))
-
     # Callbacks: they record, and never raise, as pymunk prints exceptions and forgets them.
 
     def _before_wall(self, arbiter: pymunk.Arbiter, space: pymunk.Space, data: object) -> None:
         try:
             arbiter.process_collision = self._see_wall(arbiter) < -TOLERANCE
-        except Exception as error:
-            self._error = error
-
-    def _after_wall(self, arbiter: pymunk.Arbiter, space: pymunk.Space, data: object) -> None:
-        try:
-            self._see_wall(arbiter, impulse=arbiter.total_impulse.length / SIM_LINK)
         except Exception as error:
             self._error = error
 
@@ -143,15 +163,18 @@ class ArmSpace:
         except Exception as error:
             self._error = error
 
-    def _after_link(self, arbiter: pymunk.Arbiter, space: pymunk.Space, data: object) -> None:
+    def _after(self, arbiter: pymunk.Arbiter, space: pymunk.Space, data: object) -> None:
         try:
-            self._see_link(arbiter, impulse=arbiter.total_impulse.length / SIM_LINK)
+            key, wall, place, clearance = self._pressed[arbiter.shapes]
+            # Of two links the outer one's mass: the first link may be immovable.
+            impulse = arbiter.total_impulse.length / SIM_LINK / self._masses[max(key[0], key[1])]
+            self._log.touch(key, self.substep, wall, place, clearance, impulse)
         except Exception as error:
             self._error = error
 
-    def _see_wall(self, arbiter: pymunk.Arbiter, *, impulse: float = 0.0) -> float:
+    def _see_wall(self, arbiter: pymunk.Arbiter) -> float:
         """Record a contact with a wall; return its clearance in simulator units."""
-        link_shape, wall_shape = arbiter.shapes
+        link_shape, wall_shape = shapes = arbiter.shapes
         link, (piece, margin) = self._links[link_shape], self._walls[wall_shape]
         contacts = arbiter.contact_point_set
         point, distance = self._deepest(contacts, from_base_on=link < self.n_held)
@@ -164,27 +187,34 @@ class ArmSpace:
             if inner and clearance + self._radius > 0.0 and _is_behind(piece, contacts.normal):
                 clearance = -clearance - 2.0 * self._radius
         key = (link, -1, piece.wall if corner is None else -1, corner, piece.radius > 0.0)
-        self._record(key, piece.wall, point, clearance, impulse)
+        self._record(shapes, key, piece.wall, point, clearance)
         return clearance
 
-    def _see_link(self, arbiter: pymunk.Arbiter, *, impulse: float = 0.0) -> float:
+    def _see_link(self, arbiter: pymunk.Arbiter) -> float:
         """Record a contact between links; return its clearance in simulator units."""
-        a, b = sorted(self._links[shape] for shape in arbiter.shapes)
+        shapes = arbiter.shapes
+        a, b = sorted(self._links[shape] for shape in shapes)
         point, distance = self._deepest(arbiter.contact_point_set, from_base_on=a < self.n_held)
         clearance = distance + 2.0 * TOLERANCE
         if point is None or clearance > TOLERANCE:
             return math.inf
-        self._record((a, b, -1, None, False), -1, point, clearance, impulse)
+        self._record(shapes, (a, b, -1, None, False), -1, point, clearance)
         self.clearances[b] = min(self.clearances[b], clearance)
         return clearance
 
-    def _record(self, key: ContactKey, wall: int, point: Place, clearance: float, impulse: float) -> None:
+    def _record(
+        self,
+        shapes: tuple[pymunk.Shape, pymunk.Shape],
+        key: ContactKey,
+        wall: int,
+        point: Place,
+        clearance: float,
+    ) -> None:
         self.clearances[key[0]] = min(self.clearances[key[0]], clearance)
-        # Of two links the outer one's mass: the first link may be immovable.
-        impulse /= self._masses[max(key[0], key[1])]
-        self._log.touch(
-            key, self.substep, wall, self._frame.place_in_maze(point), clearance / self._frame.scale, impulse
-        )
+        place, depth = self._frame.place_in_maze(point), clearance / self._frame.scale
+        self._log.touch(key, self.substep, wall, place, depth, 0.0)
+        if clearance < -TOLERANCE:
+            self._pressed[shapes] = (key, wall, place, depth)
 
     def _deepest(self, contacts: pymunk.ContactPointSet, *, from_base_on: bool) -> tuple[Place | None, float]:
         """Return the deepest point of a contact, on the second shape, and its distance.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -39,6 +40,10 @@ class Frame:
     base_pose: tuple[float, float, float]
     scale: float
 
+    @cached_property
+    def _turn(self) -> tuple[float, float]:
+        return math.cos(self.base_pose[2]), math.sin(self.base_pose[2])
+
     def to_simulator(self, points: ArrayLike) -> FloatArray:
         """Return points, shape (..., 2), in the simulator's frame."""
         x, y, heading = self.base_pose
@@ -48,8 +53,8 @@ class Frame:
 
     def place_in_maze(self, point: tuple[float, float]) -> tuple[float, float]:
         """Return one point in the maze's frame."""
-        x, y, heading = self.base_pose
-        cos, sin = math.cos(heading), math.sin(heading)
+        x, y, _ = self.base_pose
+        cos, sin = self._turn
         return (
             x + (point[0] * cos - point[1] * sin) / self.scale,
             y + (point[0] * sin + point[1] * cos) / self.scale,
