@@ -15,8 +15,10 @@ from hrsnake_env.arm import FEEDER_RELEASE, FloatArray
 __all__ = [
     "divide",
     "drive",
+    "largest_distance",
     "largest_move",
     "limited_forces",
+    "place_joints",
     "place_links",
     "read_links",
     "servo_forces",
@@ -85,6 +87,36 @@ def place_links(target: FloatArray, link_length: float, poses: FloatArray, nodes
 
 
 @numba.njit(cache=True)
+def place_joints(target: FloatArray, link_length: float, joints: FloatArray) -> None:
+    """Compute where the joints of a configuration lie, up to a constant shift along the feeder.
+
+    Parameters
+    ----------
+    target : array, shape (1 + n_links,)
+        Feed and joint angles.
+    joints : array, shape (n_links + 1, 2)
+        Written: base end first.
+    """
+    x, y, heading = target[0], 0.0, 0.0
+    joints[0, 0], joints[0, 1] = x, y
+    for k in range(1, target.shape[0]):
+        heading += target[k]
+        x += link_length * math.cos(heading)
+        y += link_length * math.sin(heading)
+        joints[k, 0], joints[k, 1] = x, y
+
+
+@numba.njit(cache=True)
+def largest_distance(a: FloatArray, b: FloatArray) -> float:
+    """Return the largest distance between points of the same number, arrays of shape (n, 2)."""
+    largest2 = 0.0
+    for k in range(a.shape[0]):
+        dx, dy = b[k, 0] - a[k, 0], b[k, 1] - a[k, 1]
+        largest2 = max(largest2, dx * dx + dy * dy)
+    return math.sqrt(largest2)
+
+
+@numba.njit(cache=True)
 def largest_move(start: FloatArray, targets: FloatArray, link_length: float) -> float:
     """Compute the largest movement of any joint from one configuration to the next.
 
@@ -99,19 +131,14 @@ def largest_move(start: FloatArray, targets: FloatArray, link_length: float) -> 
     -------
     move : float
     """
-    n_links = start.shape[0] - 1
+    n_joints = start.shape[0]
+    before, now = np.empty((n_joints, 2)), np.empty((n_joints, 2))
+    place_joints(start, link_length, before)
     largest = 0.0
     for i in range(targets.shape[0]):
-        before = start if i == 0 else targets[i - 1]
-        dx, dy = targets[i, 0] - before[0], 0.0
-        heading_before, heading = 0.0, 0.0
-        largest = max(largest, abs(dx))
-        for k in range(n_links):
-            heading_before += before[1 + k]
-            heading += targets[i, 1 + k]
-            dx += link_length * (math.cos(heading) - math.cos(heading_before))
-            dy += link_length * (math.sin(heading) - math.sin(heading_before))
-            largest = max(largest, math.hypot(dx, dy))
+        place_joints(targets[i], link_length, now)
+        largest = max(largest, largest_distance(before, now))
+        before, now = now, before
     return largest
 
 

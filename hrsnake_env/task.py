@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrsnake_env.arm import FloatArray
-from hrsnake_env.dynamics import largest_move, step_targets
+from hrsnake_env.dynamics import largest_distance, place_joints, step_targets
 
 __all__ = [
     "ACTIONS",
@@ -145,6 +145,8 @@ def next_target(
     n = target.shape[0]
     reach, feed_step = (n - 1) * link_length, FEED_STEP * link_length
     change, row = np.empty(n), np.empty((1, n))
+    before, after = np.empty((n, 2)), np.empty((n, 2))
+    place_joints(target, link_length, before)
     for k in range(n):
         if not math.isfinite(action[k]):
             return k
@@ -161,9 +163,10 @@ def next_target(
             wanted[k] = min(max(target[k] + change[k], -joint_limit), joint_limit)
         step_targets(target, wanted, link_length, row)  # straight in the feeder
         wanted[:] = row[0]
-        move = largest_move(target, row, link_length)
+        place_joints(wanted, link_length, after)
+        move = largest_distance(before, after)
         if move <= largest * (1.0 + 1e-6):
             return -1
-        change *= largest / move
+        change *= 0.99 * largest / move  # a little less, as the way is not quite in proportion
     wanted[:] = target
     return -1

@@ -123,7 +123,7 @@ def test_a_ratio_compares_with_the_peer_of_its_round(monkeypatch, tmp_path):
     for row in figures["ours"]:
         assert row["ratio"] == {"median": 1.0, "least": 1.0, "largest": 1.0}
         assert (row["steps"], row["resets"], row["touched"]) == (3000, 3, 0.01)
-    text = environment_markdown(run_environment(TINY, parts=(), quiet=True) | {"peers": figures})
+    text = environment_markdown(run_environment(TINY, parts=(), quiet=True) | {"peers": [figures]})
     assert ">= 4: not met" in text and ">= 0.6: met" in text
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from planners.bench.environment_episodes import episodes, resets
-from planners.bench.environment_peers import SUBSTEPS, beside_peers, peers_python
+from planners.bench.environment_peers import HOLDS, SUBSTEPS, beside_peers, peers_python
 from planners.bench.environment_random import (
     EVERY_MAZE,
     random_policies,
@@ -162,8 +162,8 @@ def _measure(
     match part:
         case "peers":
             python = peers_python(PEERS_FOLDER) if peers is None else peers
-            with bar(part, rounds, quiet) as tell:
-                return beside_peers(python, window, rounds, tell)
+            with bar(part, len(HOLDS) * rounds, quiet) as tell:
+                return [beside_peers(python, window, rounds, tell, hold=hold) for hold in HOLDS]
         case "where":
             with bar(part, len(sizes.links) * (sizes.where_rounds + 1), quiet) as tell:
                 return where(sizes.links, sizes.where_steps, sizes.where_rounds, tell)

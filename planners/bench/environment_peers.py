@@ -17,9 +17,10 @@ import numpy as np
 
 from hrsnake_env.errors import InputError
 from planners.bench.environment_scenes import ENV_ID, arm_in_hall, half_out, hall
+from planners.bench.environment_stepper import HOLD
 from planners.bench.pool import Tell
 
-__all__ = ["PEERS", "TARGETS", "beside_peers", "ours_in_hall", "peers_python", "spread", "stepping"]
+__all__ = ["HOLDS", "PEERS", "TARGETS", "beside_peers", "ours_in_hall", "peers_python", "spread", "stepping"]
 
 PEERS: dict[str, dict[str, Any]] = {
     "gym-pusht": {"make": "gym_pusht:gym_pusht/PushT-v0", "arguments": {"obs_type": "state"}},
@@ -34,6 +35,9 @@ LINKS = {12: "gym-pusht", 45: "Swimmer-v5"}
 """Links of our arms, and what they are compared with."""
 
 SUBSTEPS = (1, 2, 4)
+
+HOLDS = (1, HOLD)
+"""Steps for which a random action is held: a new one in every step is the custom, held ones move the arm."""
 
 TARGETS = {(12, 1): 4.0, (12, 2): 4.0, (12, 4): 4.0, (45, 1): 1.2, (45, 2): 0.6}
 """Ratios that we want to reach, by links and substeps."""
@@ -95,7 +99,7 @@ def stepping(
     python : Path or str
         Which Python.
     order : mapping
-        What it makes: `make` (an id), `arguments`, `options`, `seed`.
+        What it makes: `make` (an id), `arguments`, `options`, `seed`, `hold`.
     script : Path, optional
         By default `environment_stepper.py`.
 
@@ -167,14 +171,18 @@ def ours_in_hall(maze_file: Path) -> dict[tuple[int, int], dict[str, Any]]:
 
 @contextmanager
 def _contenders(
-    python: Path | str, peers: Mapping[str, Mapping[str, Any]]
+    python: Path | str, peers: Mapping[str, Mapping[str, Any]], hold: int
 ) -> Iterator[dict[Any, Callable[[float], dict[str, float]]]]:
     """Start one process for each environment; they end with the block."""
     with ExitStack() as stack, tempfile.TemporaryDirectory() as folder:
-        runs = {key: stack.enter_context(stepping(python, order)) for key, order in peers.items()}
+        orders: dict[Any, tuple[Path | str, Mapping[str, Any]]] = {
+            key: (python, order) for key, order in peers.items()
+        }
         ours = ours_in_hall(Path(folder) / "hall.geojson")
-        yield runs | {
-            key: stack.enter_context(stepping(sys.executable, order)) for key, order in ours.items()
+        orders |= {key: (sys.executable, order) for key, order in ours.items()}
+        yield {
+            key: stack.enter_context(stepping(python, {**order, "hold": hold}))
+            for key, (python, order) in orders.items()
         }
 
 
@@ -183,6 +191,8 @@ def beside_peers(
     window: float,
     rounds: int,
     tell: Tell = lambda: None,
+    *,
+    hold: int = HOLD,
     peers: Mapping[str, Mapping[str, Any]] = PEERS,
 ) -> dict[str, Any]:
     """Measure peers and ours in turns, and compare them round by round.
@@ -197,6 +207,8 @@ def beside_peers(
         So many.
     tell : callable
         Called after each round.
+    hold : int
+        So many steps each random action is held.
     peers : mapping
         What is measured beside, by the names of `PEERS`.
 
@@ -205,7 +217,7 @@ def beside_peers(
     figures : dict
         Rates of the peers, and of ours with their ratios, steps with a collision, and targets.
     """
-    with _contenders(python, peers) as contenders:
+    with _contenders(python, peers, hold) as contenders:
         for run in contenders.values():
             run(min(WARM_UP, window))
         every: dict[Any, list[dict[str, float]]] = {key: [] for key in contenders}
@@ -217,6 +229,7 @@ def beside_peers(
     return {
         "window_s": window,
         "rounds": rounds,
+        "hold": hold,
         "peers": [{"name": name, "rate": spread(rates[name])} for name in peers],
         "ours": [_row(key, every[key], rates) for key in every if key not in peers],
     }

@@ -18,7 +18,8 @@ N_ACTIONS = 997
 """So many actions are sampled beforehand."""
 
 HOLD = 10
-"""So many steps each of them is held: a motor that gets a new order in every step hardly moves anything."""
+"""So many steps each of them is held, unless told otherwise: a motor that gets a new order in every step
+hardly moves anything."""
 
 CHUNK = 10
 """Steps between two looks at the clock."""
@@ -35,12 +36,16 @@ class Stepper:
         Of the actions, and of the first reset.
     options : mapping, optional
         Of every reset.
+    hold : int
+        So many steps each action is held.
     """
 
-    def __init__(self, env: Any, seed: int = 0, options: Mapping[str, Any] | None = None) -> None:
+    def __init__(
+        self, env: Any, seed: int = 0, options: Mapping[str, Any] | None = None, hold: int = HOLD
+    ) -> None:
         self._env, self._options = env, options
         env.action_space.seed(seed)
-        self._actions = [action for _ in range(N_ACTIONS) for action in [env.action_space.sample()] * HOLD]
+        self._actions = [action for _ in range(N_ACTIONS) for action in [env.action_space.sample()] * hold]
         self._next = 0
         env.reset(seed=seed, options=options)
 
@@ -85,7 +90,7 @@ def _make(order: Mapping[str, Any]) -> tuple[Stepper, dict[str, Any]]:
     import gymnasium
 
     env = gymnasium.make(order["make"], **order.get("arguments", {}))
-    stepper = Stepper(env, order.get("seed", 0), order.get("options"))
+    stepper = Stepper(env, order.get("seed", 0), order.get("options"), order.get("hold", HOLD))
     return stepper, {"ready": order["make"], "gymnasium": gymnasium.__version__}
 
 

@@ -26,29 +26,35 @@ def environment_markdown(results: Mapping[str, Any]) -> str:
     )
 
 
-def _peers(data: Mapping[str, Any]) -> Iterator[str]:
+def _peers(runs: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    data = runs[0]
     yield (
         "**peers**: steps per second of processor time through `gym.make`, each in a process of its own, in "
         f"turns of {data['window_s']:g} s, {data['rounds']} rounds; medians, and from the least to the "
         "largest. A ratio compares ours with the peer in the same round. Our arms move among the pillars of "
         "a hall with 40 wall segments, half out of the feeder at first; `collisions` says in how many of "
-        "their steps a link was in one. By default the environment has 4 substeps."
+        "their steps a link was in one. By default the environment has 4 substeps. Random actions are new in "
+        "every step, as is the custom, or held, so that arms move and meet walls."
     )
     yield ""
-    rows = [(peer["name"], "", _rate(peer["rate"]), "1", "", "") for peer in data["peers"]]
-    for row in data["ours"]:
-        target = row["target"]
-        rows.append(
-            (
-                f"{row['n_links']} links",
-                str(row["substeps"]),
-                _rate(row["rate"]),
-                f"{_spread(row['ratio'], '.2f')} x {row['peer']}",
-                "" if target is None else f">= {target:g}: {_met(row['ratio']['median'] >= target)}",
-                f"{row['touched']:.0%}",
-            )
-        )
-    yield from table(("environment", "substeps", "steps/s", "ratio", "target", "collisions"), rows)
+    rows: list[tuple[str, ...]] = []
+    for data in runs:
+        held = "new" if data["hold"] == 1 else f"held for {data['hold']}"
+        rows += [(held, peer["name"], "", _rate(peer["rate"]), "1", "", "") for peer in data["peers"]]
+        rows += [(held, *_peers_row(row)) for row in data["ours"]]
+    yield from table(("actions", "environment", "substeps", "steps/s", "ratio", "target", "collisions"), rows)
+
+
+def _peers_row(row: Mapping[str, Any]) -> tuple[str, ...]:
+    target = row["target"]
+    return (
+        f"{row['n_links']} links",
+        str(row["substeps"]),
+        _rate(row["rate"]),
+        f"{_spread(row['ratio'], '.2f')} x {row['peer']}",
+        "" if target is None else f">= {target:g}: {_met(row['ratio']['median'] >= target)}",
+        f"{row['touched']:.0%}",
+    )
 
 
 def _where(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:

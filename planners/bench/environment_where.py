@@ -26,7 +26,7 @@ WHOLE = f"{_CLASS}.step"
 PIECES: dict[str, tuple[str, ...]] = {
     "pymunk's step": (f"{_SPACE}.pymunk.Space.step",),
     "contact callbacks": tuple(
-        f"{_SPACE}.ArmSpace.{name}" for name in ("_before_wall", "_after_wall", "_before_link", "_after_link")
+        f"{_SPACE}.ArmSpace.{name}" for name in ("_before_wall", "_before_link", "_after")
     ),
     "pymunk's batches": tuple(
         f"{_PHYSICS}.pymunk.batch.{name}" for name in ("get_space_bodies", "set_space_bodies")
