@@ -12,7 +12,7 @@ demo: $(VENV)/.core
 
 ## test: run all tests
 test: $(VENV)/.all
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
 ## notebooks: execute the notebooks, and write them with their figures to notebooks/build/
 notebooks: $(VENV)/.all

@@ -554,7 +554,8 @@ class Physics:
     def clearance(self) -> FloatArray:
         """Clearance of each link to the walls, shape (n_links,), in maze units.
 
-        Exact where it is positive, at most one link length, and that in the feeder. Where a link has touched
+        Exact where it is positive, at most one link length, and that in the feeder; to a link that is leaving
+        the feeder, walls behind the base are no matter. Where a link has touched
         something within the last pose, the smallest clearance of the contacts, negative below the surface.
         """
         return self.sense().clearances.copy()

@@ -97,7 +97,8 @@ def test_a_link_that_cuts_a_corner_is_as_deep_as_the_corner_is_from_its_centre_l
     assert [contact.corner for contact in contacts] == [(100.0, 1400.0)]
     assert contacts[0].clearance == pytest.approx(-math.copysign(distance, depth), abs=EXACT)
     assert contacts[0].link == N_LINKS - 1
-    assert contacts[0].kind == ("collision" if depth > TOLERANCE else "pinch")
+    if abs(depth - TOLERANCE) > EXACT:
+        assert contacts[0].kind == ("collision" if depth > TOLERANCE else "pinch")
 
 
 @given(st.floats(-0.19, 5.0), st.floats(300.0, 1300.0))
@@ -141,10 +142,13 @@ def test_clearance_is_the_distance_to_the_walls_and_negative_across_one(drawn):
     physics.reset(feed, angles)
     joints = physics.joints
     half_slot = SLOT_TOLERANCES * TOLERANCE  # the walls are open for the feeder
-    walls = maze.free_space.boundary - shapely.box(-half_slot, -1e4, half_slot, maze.base_pose[1])
+    base = maze.base_pose[1]
+    walls = maze.free_space.boundary - shapely.box(-half_slot, -1e4, half_slot, base)
+    in_front = maze.free_space.boundary - shapely.box(-1e4, -1e4, 1e4, base)
     for k in range(N_LINKS):
-        if joints[k, 1] >= maze.base_pose[1]:
-            distance = LineString(joints[k : k + 2]).distance(walls)
+        if joints[k, 1] >= base:
+            # To a link that is just leaving the feeder the walls behind the base are no matter.
+            distance = LineString(joints[k : k + 2]).distance(walls if joints[k, 1] > base else in_front)
             if distance == 0.0:
                 assert physics.clearance[k] < 0.0
                 continue

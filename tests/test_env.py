@@ -13,7 +13,7 @@ from gymnasium.utils.env_checker import check_env
 
 import hrsnake_env
 from hrsnake_env import ArmSpec, InputError, Maze
-from hrsnake_env.arm import FEEDER_RELEASE, feeder_angle_limits
+from hrsnake_env.arm import FEEDER_RELEASE, feeder_angle_limits, joints_from_configuration
 from hrsnake_env.env import HyperRedundantMazeEnv
 from hrsnake_env.observation import observation_names, observation_parts
 from hrsnake_env.options import RESET_OPTIONS
@@ -269,16 +269,24 @@ def test_no_joint_moves_farther_in_a_step_than_the_largest_step():
     rng = np.random.default_rng(1)
     env.reset(options={"feed": 1300.0})
     before = env.physics.target_joints
+    collided = 0
     for _ in range(100):
-        _, _, terminated, _, _ = env.step(rng.choice([-1.0, 1.0], env.action_space.shape))
+        _, _, terminated, _, info = env.step(rng.choice([-1.0, 1.0], env.action_space.shape))
         after = env.physics.target_joints
         assert np.linalg.norm(after - before, axis=1).max() <= LARGEST_STEP * 430.0 * 1.001
         limits = feeder_angle_limits(env.target[0], env.physics.n_links, 430.0)
         assert (np.abs(env.target[1:]) <= limits + 1e-12).all()
         before = after
+        if info["collisions"]:  # then the targets are taken back to where the arm is
+            collided += 1
+            feed, angles = env.physics.feed, env.physics.joint_angles
+            limits = feeder_angle_limits(feed, env.physics.n_links, 430.0)
+            angles = np.clip(angles, -limits, limits)
+            before = joints_from_configuration(feed, angles, 430.0, env.maze.base_pose)
         if terminated:
             env.reset(options={"feed": 1300.0})
             before = env.physics.target_joints
+    assert 0 < collided < 100
 
 
 def test_joints_in_the_feeder_stay_straight_whatever_their_action():
