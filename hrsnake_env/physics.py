@@ -156,6 +156,7 @@ class Physics:
         self._largest_move = SIM_LINK * (THIN_MOVE if has_thin_walls(self._pieces, SIM_LINK) else THICK_MOVE)
         self._wall_shapes = WallShapes(self._pieces)
         self._allocate()
+        self._untouched_at: FloatArray | None = None
         self.reset()
 
     def _allocate(self) -> None:
@@ -193,6 +194,8 @@ class Physics:
         target = self._as_target(feed, angles)
         step_targets(target, target, SIM_LINK, self._targets)
         target = self._targets[-1].copy()
+        if self._untouched_at is not None and np.array_equal(self._untouched_at, target):
+            return  # just built, and there already
         links = np.zeros((self.n_links, 6))
         place_links(target, SIM_LINK, self._poses, self._nodes)
         links[:, :3] = self._poses
@@ -216,10 +219,11 @@ class Physics:
         self._check_order()
         if self.kinematic:
             self._substep(0, target)
+        self._untouched_at = target
 
     def _begin(self, start: _Start) -> None:
         """Build the simulator afresh, and put the arm where it starts."""
-        self._start, self._moves = start, list[Move]()
+        self._start, self._moves, self._untouched_at = start, list[Move](), None
         self._target[:], self._last_target[:], self._effort[:] = start.target, start.last_target, start.effort
         self._n_efforts, self._n_held, self.pose = start.n_efforts, start.n_held, start.pose
         self._n_active, self._past_link_poses = start.n_active, start.past_link_poses
@@ -279,6 +283,7 @@ class Physics:
 
     def _move(self, kind: Literal["advance", "take_back", "settle"], end: FloatArray | None) -> None:
         self._moves.append((kind, end))
+        self._untouched_at = None
         if kind == "take_back":
             here = np.concatenate([[self.feed * self._scale], self.joint_angles])
             step_targets(here, here, SIM_LINK, self._targets)
