@@ -20,8 +20,9 @@ from hrsnake_env.geodesic import look_ahead
 from hrsnake_env.maze import Maze
 from hrsnake_env.observation import AHEAD, observation_parts, observation_space, write_observation
 from hrsnake_env.options import ResetOptions
-from hrsnake_env.physics import CONTROL_TIMESTEP, Physics, PhysicsState
+from hrsnake_env.physics import CONTROL_TIMESTEP, Physics
 from hrsnake_env.rendering import HEIGHT, Frame
+from hrsnake_env.saved import PhysicsState
 from hrsnake_env.scenes import NO_TASK, Scene, Scenes
 from hrsnake_env.tally import Tally
 from hrsnake_env.view import View

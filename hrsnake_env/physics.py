@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -18,11 +16,12 @@ from hrsnake_env.contacts import PINCH_TOLERANCE, Contact, ContactLog, PinchRepo
 from hrsnake_env.dynamics import divide, drive, place_links, read_links, step_targets
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
+from hrsnake_env.saved import Move, PhysicsState, SimulationStart
 from hrsnake_env.sensing import N_READINGS, N_TIP_RAYS, Senses, cast_rays, read_arm
 from hrsnake_env.space import SIM_LINK, TOLERANCE, ArmSpace, WallShapes
 from hrsnake_env.walls import Frame, has_thin_walls, wall_pieces
 
-__all__ = ["CONTROL_TIMESTEP", "RAY_REACH", "Physics", "PhysicsState", "simulate"]
+__all__ = ["CONTROL_TIMESTEP", "RAY_REACH", "Physics"]
 
 CONTROL_TIMESTEP = 0.05
 """In s: the time from one pose to the next."""
@@ -49,43 +48,6 @@ STATE = (
 )
 POSES = pymunk.batch.BodyFields.POSITION | pymunk.batch.BodyFields.ANGLE
 FORCES = pymunk.batch.BodyFields.FORCE | pymunk.batch.BodyFields.TORQUE
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _Start:
-    """Hold a simulation whose solver remembers nothing: of a reset, or of a canonical snapshot.
-
-    In simulator units; `n_active` links have been in the maze in this pose, and `past_link_poses` counts
-    those of the poses before.
-    """
-
-    links: FloatArray
-    target: FloatArray
-    last_target: FloatArray
-    touched: FloatArray
-    effort: FloatArray
-    n_efforts: int
-    tracking: FloatArray
-    pose: int
-    n_held: int
-    n_active: int
-    past_link_poses: int
-    log: ContactLog
-
-
-Move = tuple[Literal["advance", "take_back", "settle"], FloatArray | None]
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class PhysicsState:
-    """Hold where a simulation stands, for `Physics.set_state`: where it started, and every move since.
-
-    The solver remembers impulses that pymunk does not tell of, so a state repeats the moves since the reset,
-    or since the last `Physics.snapshot`, and so is exact to the last bit.
-    """
-
-    start: _Start
-    moves: tuple[Move, ...]
 
 
 class Physics:
@@ -201,7 +163,7 @@ class Physics:
         links[:, :3] = self._poses
         n_held = self._held(target[0])
         self._begin(
-            _Start(
+            SimulationStart(
                 links=links,
                 target=target,
                 last_target=target,
@@ -221,7 +183,7 @@ class Physics:
             self._substep(0, target)
         self._untouched_at = target
 
-    def _begin(self, start: _Start) -> None:
+    def _begin(self, start: SimulationStart) -> None:
         """Build the simulator afresh, and put the arm where it starts."""
         self._start, self._moves, self._untouched_at = start, list[Move](), None
         self._target[:], self._last_target[:], self._effort[:] = start.target, start.last_target, start.effort
@@ -413,7 +375,7 @@ class Physics:
         the same to the last bit. It may differ in the last digits from what would have followed without.
         """
         self._begin(
-            _Start(
+            SimulationStart(
                 links=self._state.copy(),
                 target=self._target.copy(),
                 last_target=self._last_target.copy(),
@@ -586,61 +548,3 @@ class Physics:
             node_error=float(self._tracking[2]) / self._scale,
             drift=float(self._tracking[3]) / self._scale,
         )
-
-
-def simulate(
-    maze: Maze,
-    arm: ArmSpec,
-    feed: ArrayLike,
-    joint_angles: ArrayLike,
-    *,
-    substeps: int = 4,
-    kinematic: bool = False,
-    torque_limit: float | None = None,
-    actuation: str = "computed_torque",
-) -> PinchReport:
-    """Run the poses of a motion through the simulator, and say whether links merely pinched the walls.
-
-    Parameters
-    ----------
-    maze : Maze
-        The maze.
-    arm : ArmSpec
-        The arm; its number of links is that of `joint_angles`.
-    feed : array-like, shape (n_poses,)
-        In maze units.
-    joint_angles : array-like, shape (n_poses, n_links)
-        In rad.
-    substeps, torque_limit, actuation
-        As `Physics` has them.
-    kinematic : bool
-        Run the exact pass alone. By default the report is of the dynamic run, and holds the exact pass.
-
-    Returns
-    -------
-    report : PinchReport
-    """
-    feeds, angles = np.asarray(feed, dtype=np.float64), np.asarray(joint_angles, dtype=np.float64)
-    if angles.ndim != 2 or feeds.shape != angles.shape[:1] or len(feeds) == 0:
-        raise InputError(
-            f"Expected feed with shape (n_poses,) and joint_angles with shape (n_poses, n_links), "
-            f"got {feeds.shape} and {angles.shape}."
-        )
-    arm = dataclasses.replace(arm, n_links=angles.shape[1])
-    physics = Physics(
-        maze,
-        arm,
-        substeps=substeps,
-        kinematic=kinematic,
-        torque_limit=torque_limit,
-        actuation=actuation,
-    )
-    physics.reset(feeds[0], angles[0])
-    for k in range(1, len(feeds)):
-        physics.advance(feeds[k], angles[k])
-    physics.settle()
-    report = physics.report()
-    if kinematic:
-        return report
-    exact = simulate(maze, arm, feeds, angles, substeps=substeps, kinematic=True)
-    return dataclasses.replace(report, kinematic=exact)

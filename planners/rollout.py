@@ -16,8 +16,9 @@ import hrsnake_env  # registers the environment
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.contacts import Contact, PinchReport
 from hrsnake_env.maze import Maze
-from hrsnake_env.physics import CONTROL_TIMESTEP, simulate
+from hrsnake_env.physics import CONTROL_TIMESTEP
 from hrsnake_env.replay import Trace
+from hrsnake_env.simulation import simulate
 from planners.controllers import PlannedPolicy
 from planners.problem import Motion, Progress
 

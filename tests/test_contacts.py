@@ -14,7 +14,8 @@ from hrsnake_env.arm import ArmSpec, feeder_angle_limits, joints_from_configurat
 from hrsnake_env.contacts import PINCH_TOLERANCE, ContactLog, pinch_report
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import fig19
-from hrsnake_env.physics import SLOT_TOLERANCES, Physics, simulate
+from hrsnake_env.physics import SLOT_TOLERANCES, Physics
+from hrsnake_env.simulation import simulate
 
 LENGTH = 200.0
 N_LINKS = 9

@@ -15,7 +15,8 @@ from hrsnake_env.dynamics import largest_move, place_links, step_targets
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import fig19
-from hrsnake_env.physics import CONTROL_TIMESTEP, Physics, simulate
+from hrsnake_env.physics import CONTROL_TIMESTEP, Physics
+from hrsnake_env.simulation import simulate
 
 LENGTH = 200.0
 N_LINKS = 9
