@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hrsnake_env.arguments import is_number
 from hrsnake_env.errors import InputError
 
 __all__ = [
@@ -60,7 +60,7 @@ class ArmSpec:
     joint_limit: float | None = None
 
     def __post_init__(self) -> None:
-        if not _is_number(self.link_length) or not (0.0 < self.link_length < math.inf):
+        if not is_number(self.link_length) or not (0.0 < self.link_length < math.inf):
             raise InputError(f"Expected a positive, finite link_length, got {self.link_length!r}.")
         if self.n_links is not None and (
             isinstance(self.n_links, bool)
@@ -70,19 +70,15 @@ class ArmSpec:
             raise InputError(
                 f"Expected n_links to be a whole number of at least 1, or None, got {self.n_links!r}."
             )
-        if not _is_number(self.link_radius) or not (0.0 <= self.link_radius < self.link_length / 2):
+        if not is_number(self.link_radius) or not (0.0 <= self.link_radius < self.link_length / 2):
             raise InputError(
                 f"Expected link_radius of at least 0 and under half a link length "
                 f"({self.link_length / 2:g}), got {self.link_radius!r}."
             )
         if self.joint_limit is not None and (
-            not _is_number(self.joint_limit) or not (0.0 < self.joint_limit <= math.pi)
+            not is_number(self.joint_limit) or not (0.0 < self.joint_limit <= math.pi)
         ):
             raise InputError(f"Expected joint_limit in (0, pi] rad, or None, got {self.joint_limit!r}.")
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
 
 
 def joints_from_configuration(

@@ -13,7 +13,8 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from hrsnake_env import task
-from hrsnake_env.arm import FloatArray
+from hrsnake_env.arguments import check_at_least, check_flag, check_one_of, is_number, numbers
+from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.contacts import PinchReport
 from hrsnake_env.errors import InputError
 from hrsnake_env.geodesic import look_ahead
@@ -34,6 +35,8 @@ __all__ = ["EnvState", "HyperRedundantMazeEnv"]
 class EnvState:
     """Hold where an episode stands, from `HyperRedundantMazeEnv.get_state`; it can be pickled."""
 
+    arm: ArmSpec
+    world: dict[str, Any]
     maze: Maze
     task_id: int
     target: FloatArray
@@ -245,13 +248,15 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         actuation: str = "computed_torque",
         render_mode: str | None = None,
     ) -> None:
-        _check_one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
-        _check_one_of("action", action, task.ACTIONS)
-        _check_one_of("reward_type", reward_type, task.REWARDS)
-        _check_at_least("contact_penalty", contact_penalty, 0.0)
-        _check_at_least("success_hold_steps", success_hold_steps, 1, whole=True)
-        _check_at_least("image_size", image_size, 16, whole=True)
-        if goal_radius is not None and not (_is_number(goal_radius) and 0.0 < goal_radius < math.inf):
+        check_one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
+        check_one_of("action", action, task.ACTIONS)
+        check_one_of("reward_type", reward_type, task.REWARDS)
+        check_at_least("contact_penalty", contact_penalty, 0.0)
+        check_at_least("success_hold_steps", success_hold_steps, 1, whole=True)
+        check_at_least("image_size", image_size, 16, whole=True)
+        check_flag("rays", rays)
+        check_flag("terminate_on_collision", terminate_on_collision)
+        if goal_radius is not None and not (is_number(goal_radius) and 0.0 < goal_radius < math.inf):
             raise InputError(f"Expected a positive, finite goal_radius, or None, got {goal_radius!r}.")
         self._scenes = Scenes(
             maze,
@@ -278,10 +283,10 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         self._absolute, self._reward_type, self._contact_penalty = (
             action == "absolute",
             reward_type,
-            contact_penalty,
+            float(contact_penalty),
         )
-        self._success_hold_steps = success_hold_steps
-        self._terminate_on_collision = terminate_on_collision
+        self._success_hold_steps = int(success_hold_steps)
+        self._terminate_on_collision = bool(terminate_on_collision)
         self._joint_limit = math.pi if joint_limit is None else joint_limit
         self._reach = n_links * link_length
         self._scales = np.array(
@@ -294,6 +299,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         self._eye = View((image_size, image_size), fps=self.metadata["render_fps"])
         self._enter(self._scenes.first, 0 if self._scenes.random else NO_TASK)
         self._start(0.0, np.zeros(n_links))
+        self._ready = True
 
     # The Gymnasium interface
 
@@ -316,15 +322,17 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         ------
         InputError
             If an option is unknown, or an arm cannot start so: out of what the feeder allows, in a wall,
-            across itself, or with its tip at the goal.
+            across itself, or with its tip at the goal. Then the environment must be reset again.
         """
         super().reset(seed=seed)
+        self._ready = False
         wanted = ResetOptions.parse(options, self.arm)
         if wanted.state is not None:
             self._return_to(wanted.state)
         else:
             self._enter(*self._scenes.choose(wanted, self.np_random))
             self._start(wanted.feed, wanted.joint_angles)
+        self._ready = True
         if self.render_mode == "human":
             self.render()
         return self.observe(), self._info()
@@ -336,12 +344,16 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         ------
         InputError
             If the action has another shape, or is not finite; nothing has happened then.
+        gymnasium.error.ResetNeeded
+            If the last reset was refused.
         """
+        if not self._ready:
+            raise gym.error.ResetNeeded("Expected a reset before this step, as the last one was refused.")
         # A finer action than float32 keeps its digits.
-        values = np.asarray(action, dtype=np.float64)
+        values = numbers("an action", action)
         if values.shape != self._target.shape:
             raise InputError(f"Expected an action with shape {self._target.shape}, got {values.shape}.")
-        if self._tally.collided:
+        if self._tally.collided and np.isfinite(values).all():
             # What a wall has refused is not asked for again, or the arm would wind up and jam.
             self.physics.take_back()
             self._target[:] = self.physics.target
@@ -470,6 +482,8 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
 
     def _state(self, physics: PhysicsState) -> EnvState:
         return EnvState(
+            arm=self.arm,
+            world=self._scenes.world,
             maze=self.maze,
             task_id=self._task_id,
             target=self._target.copy(),
@@ -481,6 +495,16 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
     def _return_to(self, state: Any) -> None:
         if not isinstance(state, EnvState):
             raise InputError(f"Expected a state from get_state or snapshot, got {type(state).__name__}.")
+        for what, own, its in (
+            ("arm", vars(self.arm), vars(state.arm)),
+            ("world", self._scenes.world, state.world),
+        ):
+            for key, value in own.items():
+                if its[key] != value:
+                    raise InputError(
+                        f"Expected a state of the same {what}, with {key}={value!r}, got one with "
+                        f"{key}={its[key]!r}."
+                    )
         self._enter(self._scenes.of(state.maze), state.task_id)
         self.physics.set_state(state.physics)
         self._target = state.target.copy()
@@ -490,6 +514,12 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
     # What it is made of
 
     def _enter(self, scene: Scene, task_id: int) -> None:
+        far = math.dist(scene.maze.goal, scene.maze.base_pose[:2])
+        if self._mode == "goal" and far > self._reach:
+            raise InputError(
+                f"Expected a goal within the arm's {self._reach:g} {scene.maze.units} for observation "
+                f"'goal', got one {far:g} off."
+            )
         self._scene, self._task_id = scene, task_id
         self._goal = (float(scene.maze.goal[0]), float(scene.maze.goal[1]))
 
@@ -601,19 +631,3 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
             "worst_depth": tally.worst_depth,
             "worst_impulse": tally.worst_impulse,
         }
-
-
-def _check_one_of(what: str, value: Any, available: tuple[Any, ...]) -> None:
-    if value not in available:
-        raise InputError(f"Unknown {what} {value!r}. Available: {', '.join(map(repr, available))}.")
-
-
-def _check_at_least(what: str, value: Any, least: float, *, whole: bool = False) -> None:
-    right = isinstance(value, int | np.integer) if whole else _is_number(value)
-    if isinstance(value, bool) or not right or not (least <= value < math.inf):
-        kind = "a whole number" if whole else "a finite number"
-        raise InputError(f"Expected {what} to be {kind} of at least {least:g}, got {value!r}.")
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)

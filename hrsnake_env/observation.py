@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from hrsnake_env.arguments import check_one_of
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.errors import InputError
 from hrsnake_env.physics import CONTROL_TIMESTEP
@@ -80,8 +81,7 @@ def observation_space(mode: str, n_links: int, *, rays: bool, image_size: int) -
     InputError
         If there is no such mode, or it has no rays.
     """
-    if mode not in OBSERVATIONS:
-        raise InputError(f"Unknown observation {mode!r}. Available: {', '.join(map(repr, OBSERVATIONS))}.")
+    check_one_of("observation", mode, OBSERVATIONS)
     if mode == "image":
         if rays:
             raise InputError("Expected rays=False with observation 'image', got True.")

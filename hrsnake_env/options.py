@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from hrsnake_env.arguments import is_number, numbers
 from hrsnake_env.arm import ArmSpec, FloatArray, feeder_angle_limits
 from hrsnake_env.errors import InputError
 
@@ -55,6 +56,8 @@ class ResetOptions:
         InputError
             If an option is unknown, contradicts another, or an arm cannot be so.
         """
+        if not (options is None or isinstance(options, Mapping)):
+            raise InputError(f"Expected reset options by name, got {options!r}.")
         given = {key: value for key, value in (options or {}).items() if value is not None}
         for key in given:
             if key not in RESET_OPTIONS:
@@ -94,7 +97,7 @@ def _whole(value: Any, key: str) -> int | None:
 def _goal(value: Any) -> FloatArray | None:
     if value is None:
         return None
-    goal = np.asarray(value, dtype=np.float64)
+    goal = numbers("a goal", value)
     if goal.shape != (2,):
         raise InputError(f"Expected a goal with shape (2,), got {goal.shape}.")
     return goal
@@ -103,13 +106,18 @@ def _goal(value: Any) -> FloatArray | None:
 def _start(given: Mapping[str, Any], n_links: int) -> tuple[float, FloatArray]:
     """Return feed and joint angles that are asked for."""
     if "motion" not in given:
-        angles = np.array(given.get("joint_angles", np.zeros(n_links)), dtype=np.float64)
-        return float(given.get("feed", 0.0)), angles
-    feeds = np.asarray(given["motion"].feed, dtype=np.float64)
+        feed, angles = given.get("feed", 0.0), given.get("joint_angles", np.zeros(n_links))
+        if not is_number(feed):
+            raise InputError(f"Expected a feed in numbers, got {feed!r}.")
+        return float(feed), numbers("joint_angles", angles)
+    motion = given["motion"]
+    if not (hasattr(motion, "feed") and hasattr(motion, "joint_angles")):
+        raise InputError(f"Expected a motion with feed and joint_angles, got {motion!r}.")
+    feeds = numbers("a motion's feed", motion.feed)
     waypoint = _whole(given.get("waypoint", 0), "waypoint") or 0
-    if waypoint >= len(feeds):
-        raise InputError(f"Expected a waypoint below {len(feeds)}, got {waypoint}.")
-    return float(feeds[waypoint]), np.array(given["motion"].joint_angles[waypoint], dtype=np.float64)
+    if feeds.ndim != 1 or waypoint >= len(feeds):
+        raise InputError(f"Expected a waypoint below {feeds.size}, got {waypoint}.")
+    return float(feeds[waypoint]), numbers("a motion's joint_angles", motion.joint_angles[waypoint])
 
 
 def _check_start(feed: float, angles: FloatArray, arm: ArmSpec) -> None:

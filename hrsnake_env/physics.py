@@ -11,6 +11,7 @@ import pymunk.batch
 from numpy.typing import ArrayLike
 
 from hrsnake_env.actuation import ACTUATIONS, aim_gears, placed_chain
+from hrsnake_env.arguments import check_one_of, is_number
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.contacts import PINCH_TOLERANCE, Contact, ContactLog, PinchReport, pinch_report
 from hrsnake_env.dynamics import divide, drive, place_links, read_links, step_targets
@@ -97,10 +98,9 @@ class Physics:
             raise InputError("Expected an arm with a number of links (n_links), got None.")
         if isinstance(substeps, bool) or not isinstance(substeps, int | np.integer) or substeps < 1:
             raise InputError(f"Expected substeps to be a whole number of at least 1, got {substeps!r}.")
-        if torque_limit is not None and not torque_limit > 0.0:
+        if torque_limit is not None and not (is_number(torque_limit) and torque_limit > 0.0):
             raise InputError(f"Expected a positive torque_limit, or None, got {torque_limit!r}.")
-        if actuation not in tuple(ACTUATIONS):
-            raise InputError(f"Unknown actuation {actuation!r}. Available: 'computed_torque', 'gear'.")
+        check_one_of("actuation", actuation, tuple(ACTUATIONS))
         if actuation == "gear" and torque_limit is not None:
             raise InputError(f"Expected no torque_limit with actuation 'gear', got {torque_limit!r}.")
         self.maze, self.arm, self.substeps, self.kinematic = maze, arm, int(substeps), kinematic

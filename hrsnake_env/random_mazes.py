@@ -8,13 +8,15 @@ asking a planner. Lengths are in links until the maze is built.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from shapely.geometry import Polygon
 
+from hrsnake_env.arguments import is_number
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.bends import MIXED, Bend, Corridor, draw_bends
 from hrsnake_env.errors import InputError
@@ -24,6 +26,7 @@ __all__ = [
     "LINK_LENGTH",
     "N_LINKS",
     "N_TASKS",
+    "checked_difficulty",
     "draw_train_maze",
     "index_of_difficulty",
     "random_maze",
@@ -167,6 +170,20 @@ def random_maze(
     raise InputError(f"Expected more links for a maze of difficulty {difficulty:g}, got n_links={n_links}.")
 
 
+def checked_difficulty(difficulty: Any) -> tuple[float, float]:
+    """Return a range of difficulties.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    ends = tuple(difficulty) if isinstance(difficulty, Sequence | np.ndarray) else ()
+    if len(ends) != 2 or not all(map(is_number, ends)) or not 0.0 <= ends[0] <= ends[1] <= 1.0:
+        raise InputError(f"Expected a range of difficulties in [0, 1], got {difficulty!r}.")
+    return float(ends[0]), float(ends[1])
+
+
 def task_maze(
     split: str,
     task_id: int,
@@ -206,9 +223,7 @@ def task_maze(
         raise InputError(
             f"Expected a whole task_id from 0 to {N_TASKS[split] - 1} of split '{split}', got {task_id!r}."
         )
-    low, high = difficulty
-    if not 0.0 <= low <= high <= 1.0:
-        raise InputError(f"Expected a range of difficulties in [0, 1], got {difficulty!r}.")
+    low, high = checked_difficulty(difficulty)
     rng = np.random.default_rng([list(N_TASKS).index(split), task_id])
     return random_maze(
         rng,

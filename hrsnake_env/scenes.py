@@ -11,18 +11,25 @@ from typing import Any
 
 import numpy as np
 
+from hrsnake_env.arguments import check_one_of
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.errors import InputError
 from hrsnake_env.geodesic import GeodesicDistance
 from hrsnake_env.maze import Maze
 from hrsnake_env.options import ResetOptions
 from hrsnake_env.physics import Physics
-from hrsnake_env.random_mazes import LINK_LENGTH, N_LINKS, N_TASKS, task_maze
+from hrsnake_env.random_mazes import LINK_LENGTH, N_LINKS, N_TASKS, checked_difficulty, task_maze
 
 __all__ = ["NO_TASK", "Scene", "Scenes"]
 
 N_KEPT = 8
 """So many mazes are kept ready."""
+
+MOST_LINKS = 1000
+"""So many links an arm gets by default at most."""
+
+N_TRIES = 100
+"""So many random mazes are drawn until one fits the arm: thick links may not fit its entry."""
 
 NO_TASK = -1
 
@@ -75,6 +82,8 @@ class Scenes:
         Whether mazes are random.
     first : Scene
         Of the first maze.
+    world : dict
+        What besides the arm and the maze an episode depends on.
     """
 
     def __init__(
@@ -90,10 +99,11 @@ class Scenes:
         difficulty: tuple[float, float],
         physics: dict[str, Any],
     ) -> None:
-        if split not in N_TASKS:
-            raise InputError(f"Unknown split {split!r}. Available: {', '.join(map(repr, N_TASKS))}.")
+        check_one_of("split", split, tuple(N_TASKS))
+        difficulty = checked_difficulty(difficulty)
         self.random = isinstance(maze, str) and maze == "random"
         self._goal_radius, self._split, self._physics = goal_radius, split, physics
+        self.world = {"goal_radius": goal_radius, **physics}
         self._named: dict[str, Maze] = {}
         if self.random:
             link_length = LINK_LENGTH if link_length is None else link_length
@@ -115,6 +125,11 @@ class Scenes:
         if n_links is None:
             # A link more than a way 10 % longer takes: links cut corners less well than a string.
             n_links = math.ceil(1.1 * distance(self._own.base_pose[:2]) / link_length) + 1
+            if n_links > MOST_LINKS:
+                raise InputError(
+                    f"Expected a link_length with which {MOST_LINKS} links reach the goal, or n_links, got "
+                    f"{link_length:g} {self._own.units}, which takes {n_links}."
+                )
         self.arm = dataclasses.replace(arm, n_links=n_links)
         self._kept: OrderedDict[Maze, Scene] = OrderedDict()
         self.first = self.of(self._own, distance)
@@ -135,9 +150,19 @@ class Scenes:
             return self.of(
                 self._own if wanted.goal is None else self._with_goal(self._own, wanted.goal)
             ), NO_TASK
-        task_id = int(rng.integers(N_TASKS[self._split])) if wanted.task_id is None else wanted.task_id
-        maze = task_maze(self._split, task_id, **self._task)
-        return self.of(self._with_goal(maze, wanted.goal)), task_id
+        if wanted.task_id is not None:
+            return self._task_scene(wanted.task_id, wanted.goal), wanted.task_id
+        for left in reversed(range(N_TRIES)):
+            task_id = int(rng.integers(N_TASKS[self._split]))
+            try:
+                return self._task_scene(task_id, wanted.goal), task_id
+            except InputError:
+                if left == 0 or wanted.goal is not None:
+                    raise
+        raise AssertionError("unreachable")
+
+    def _task_scene(self, task_id: int, goal: FloatArray | None) -> Scene:
+        return self.of(self._with_goal(task_maze(self._split, task_id, **self._task), goal))
 
     def of(self, maze: Maze, distance: GeodesicDistance | None = None) -> Scene:
         """Return the scene of a maze, whose walls and distances are computed when it is new."""
@@ -160,7 +185,10 @@ class Scenes:
     def _loaded(self, maze: Maze | str | os.PathLike[str]) -> Maze:
         if isinstance(maze, Maze):
             return maze
-        name = os.fspath(maze)
+        try:
+            name = os.fspath(maze)
+        except TypeError:
+            raise InputError(f"Expected a Maze, the name of one, or a file, got {maze!r}.") from None
         if name not in self._named:
             self._named[name] = Maze.load(name)
         return self._named[name]

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.task import FEED_STEP, JOINT_STEP
@@ -64,7 +65,8 @@ class PlannedPolicy:
 
     It goes where a trained policy goes, into `stable_baselines3.common.evaluation.evaluate_policy` too. The
     state that `predict` returns is the number of steps taken; a caller that does not hand it back gets the
-    policy's own count, which `episode_start` or `reset` sets to 0.
+    policy's own count, which `episode_start` or `reset` sets to 0. Gymnasium's vectors take a step for a
+    reset, so there an episode starts one step after the end of the last.
 
     Parameters
     ----------
@@ -151,6 +153,8 @@ class PlanningPolicy:
 
     def __init__(self, env: Any, planner: str = "auto") -> None:
         self.env, self.planner = env, planner
+        self._resets_late = _resets_late(env)
+        self._pending: NDArray[np.bool_] | None = None
         self.results: list[PlanningResult] = []
         self._known: dict[bytes, PlanningResult] = {}
         self._policies: dict[int, PlannedPolicy | None] = {}
@@ -164,10 +168,15 @@ class PlanningPolicy:
     ) -> tuple[FloatArray, None]:
         """Return the next action, as `PlannedPolicy.predict` does; it keeps count itself.
 
-        Without `episode_start` the first call begins an episode, and later calls do not.
+        Without `episode_start` the first call begins an episode, and later calls do not. Give it which
+        episodes the last step has ended, also where Gymnasium's vectors then reset one step late.
         """
         shape = _batch_shape(observation)
         starts = np.zeros(shape, dtype=bool) if episode_start is None else np.reshape(episode_start, shape)
+        if self._resets_late:
+            # The action after an end only resets: the episode begins with the one after it.
+            begun, starts = starts, np.ones(shape, dtype=bool) if self._pending is None else self._pending
+            self._pending = np.zeros(shape, dtype=bool) if self._pending is None else begun
         actions = []
         for k, start in enumerate(np.atleast_1d(starts)):
             if start or k not in self._policies:
@@ -198,6 +207,14 @@ class PlanningPolicy:
         if hasattr(self.env, "get_attr"):
             return self.env.get_attr(name)[k]
         return getattr(self.env.unwrapped, name)
+
+
+def _resets_late(env: Any) -> bool:
+    """Whether an environment is a vector that takes a step of its own for a reset, as Gymnasium's do."""
+    if not isinstance(env, gym.vector.VectorEnv):
+        return False
+    mode = env.metadata.get("autoreset_mode")  # not there before Gymnasium 1.1, when all did
+    return mode is None or getattr(mode, "name", mode) == "NEXT_STEP"
 
 
 def _batch_shape(observation: Any) -> tuple[int, ...]:

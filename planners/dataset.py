@@ -15,6 +15,7 @@ import gymnasium as gym
 import numpy as np
 
 import hrsnake_env
+from hrsnake_env.arguments import check_at_least, is_number
 from hrsnake_env.errors import InputError
 from hrsnake_env.registration import ENVIRONMENTS
 from planners.dataset_writer import DatasetWriter, mean_return
@@ -158,13 +159,15 @@ def record_dataset(
         If Minari is not installed, an argument is out of its range, or the data set is there already.
     """
     begin = time.perf_counter()
+    if isinstance(mazes, str):
+        raise InputError(f"Expected a list of mazes, got the string {mazes!r}.")
+    check_at_least("episodes", episodes, 1, whole=True)
+    check_at_least("seed", seed, 0, whole=True)
+    levels = _checked_levels(noises)
     root = _datasets_folder(path)
     folder = _new_folder(root, dataset_id)
     dataset_ids(dataset_id, [env_id])
     env = gym.make(f"{hrsnake_env.__name__}:{env_id}")
-    levels = _checked_levels(noises)
-    if episodes < 1 or seed < 0:
-        raise InputError(f"Expected episodes >= 1 and a seed >= 0, got {episodes} and {seed}.")
     starts: list[tuple[int, str | None]] = [
         (seed + k, maze) for k in range(episodes) for maze in (mazes or (None,))
     ]
@@ -230,7 +233,10 @@ def _new_folder(root: Path, dataset_id: str) -> Path:
 
 def _checked_levels(noises: Sequence[float]) -> tuple[float, ...]:
     """Return the noise levels, each once."""
-    for noise in noises:
-        if not 0.0 <= noise < np.inf:
+    levels = noises if isinstance(noises, Sequence) and not isinstance(noises, str) else ()
+    if not levels:
+        raise InputError(f"Expected a list of noise levels, got {noises!r}.")
+    for noise in levels:
+        if not (is_number(noise) and 0.0 <= noise < np.inf):
             raise InputError(f"Expected noise levels of at least 0, got {noise!r}.")
-    return tuple(dict.fromkeys(float(noise) for noise in noises))
+    return tuple(dict.fromkeys(float(noise) for noise in levels))

@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
+from hrsnake_env.arguments import is_number
 from hrsnake_env.arm import ArmSpec, FloatArray, feeder_angle_limits
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
@@ -78,7 +79,7 @@ class PlannedResets(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     ) -> None:
         RecordConstructorArgs.__init__(self, motion=motion, share=share, planner=planner)
         gym.Wrapper.__init__(self, env)
-        if not 0.0 <= share <= 1.0:
+        if not (is_number(share) and 0.0 <= share <= 1.0):
             raise InputError(f"Expected a share from 0 to 1, got {share!r}.")
         self.share, self._motions = float(share), MotionCache(planner)
         if motion is not None:
@@ -151,7 +152,7 @@ class ResidualFollower(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     def __init__(self, env: gym.Env[Any, Any], *, scale: float = 0.2) -> None:
         RecordConstructorArgs.__init__(self, scale=scale)
         gym.Wrapper.__init__(self, env)
-        if not 0.0 < scale < np.inf:
+        if not (is_number(scale) and 0.0 < scale < np.inf):
             raise InputError(f"Expected a positive, finite scale in rad, got {scale!r}.")
         self.scale = float(scale)
         self._followers: OrderedDict[bytes, tuple[FloatArray, FloatArray]] = OrderedDict()

@@ -217,6 +217,27 @@ def test_an_arm_pushed_on_into_a_wall_does_not_wind_up():
     assert info["collisions"] == 0
 
 
+def test_a_refused_action_changes_nothing_even_after_a_collision():
+    env = make(terminate_on_collision=False).unwrapped
+    env.reset(options={"feed": 1500.0})
+    while env.step(feeding(env))[-1]["collisions"] == 0:
+        pass
+    target, moves = env.target, len(env.get_state().physics.moves)
+    with pytest.raises(InputError):
+        env.step(np.full(env.action_space.shape, np.nan))
+    assert np.array_equal(env.target, target)
+    assert len(env.get_state().physics.moves) == moves
+
+
+def test_numbers_of_numpy_as_arguments_change_no_kind():
+    env = make(success_hold_steps=np.int64(2), contact_penalty=np.float32(0.5), terminate_on_collision=False)
+    _, first = env.reset(options={"feed": 1500.0})
+    for _ in range(20):
+        *_, terminated, _, info = env.step(feeding(env))
+    assert info["total_collisions"] > 0 and type(terminated) is bool
+    assert {key: type(value) for key, value in info.items()} == {key: type(v) for key, v in first.items()}
+
+
 def test_an_arm_on_gears_goes_where_a_wall_stops_one_driven_by_computed_torque():
     depths = {}
     for actuation in ("computed_torque", "gear"):
@@ -304,6 +325,7 @@ def test_joints_in_the_feeder_stay_straight_whatever_their_action():
         (np.zeros(7), r"Expected an action with shape (8,), got (7,)."),
         (np.zeros((1, 8)), r"Expected an action with shape (8,), got (1, 8)."),
         (np.array([0, 0, 0, np.nan, 0, 0, 0, 0]), r"Expected a finite action, got nan at index 3."),
+        ("a", r"Expected an action in numbers, got 'a'."),
         (np.array([np.inf, 0, 0, 0, 0, 0, 0, 0]), r"Expected a finite action, got inf at index 0."),
     ],
 )
@@ -340,6 +362,24 @@ def test_a_bad_action_is_named(action, message):
         ({"success_hold_steps": 0}, "Expected success_hold_steps to be a whole number of at least 1, got 0."),
         ({"image_size": 8}, "Expected image_size to be a whole number of at least 16, got 8."),
         ({"goal_radius": 0.0}, "Expected a positive, finite goal_radius, or None, got 0.0."),
+        ({"rays": "no"}, "Expected rays to be True or False, got 'no'."),
+        ({"terminate_on_collision": None}, "Expected terminate_on_collision to be True or False, got None."),
+        ({"maze": 5}, "Expected a Maze, the name of one, or a file, got 5."),
+        ({"split": []}, "Unknown split []. Available: 'train', 'test'."),
+        ({"torque_limit": "a"}, "Expected a positive torque_limit, or None, got 'a'."),
+        (
+            {"link_length": 1e-3},
+            "Expected a link_length with which 1000 links reach the goal, or n_links, got ",
+        ),
+        ({"difficulty": 0.5}, "Expected a range of difficulties in [0, 1], got 0.5."),
+        (
+            {"maze": "random", "difficulty": (0, 1, 2)},
+            "Expected a range of difficulties in [0, 1], got (0, 1, 2).",
+        ),
+        (
+            {"n_links": 1, "observation": "goal", "link_length": 430.0},
+            "Expected a goal within the arm's 430 px for observation 'goal', got one 735.",
+        ),
         ({"joint_limit": 4.0}, "Expected joint_limit in (0, pi] rad, or None, got 4.0."),
         (
             {"maze": "random", "difficulty": (0.5, 2.0)},

@@ -85,6 +85,34 @@ def test_the_expert_plans_for_every_new_maze_of_several_environments():
     assert sum(successes) >= 18 - unsolved
 
 
+@pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP"])
+def test_the_expert_succeeds_in_the_vectors_of_gymnasium(mode):
+    vectors = pytest.importorskip("gymnasium.vector")
+    arguments = {}
+    if hasattr(vectors, "AutoresetMode"):
+        arguments = {"vector_kwargs": {"autoreset_mode": vectors.AutoresetMode[mode]}}
+    elif mode != "NEXT_STEP":
+        pytest.skip("before Gymnasium 1.1 there was one mode")
+    env = gym.make_vec(
+        "hrsnake_env:HyperRedundantMaze-RandomTest-v0",
+        num_envs=2,
+        vectorization_mode="sync",
+        difficulty=(0.0, 0.2),
+        **arguments,
+    )
+    policy = PlanningPolicy(env)
+    observation, _ = env.reset(seed=0)
+    over, successes = np.ones(2, dtype=bool), []
+    while len(successes) < 6:
+        action, _ = policy.predict(observation, episode_start=over)
+        observation, _, terminated, truncated, info = env.step(action)
+        over = terminated | truncated
+        ended = info["final_info"] if mode == "SAME_STEP" and over.any() else info
+        successes += list(ended["is_success"][over])
+        assert not ended["total_collisions"][over].any()
+    assert all(successes)
+
+
 def test_without_a_plan_the_expert_holds_still_and_says_why():
     env = gym.make("hrsnake_env:HyperRedundantMaze-v0", maze="fig19", link_length=470.0, n_links=7)
     env = gym.wrappers.TimeLimit(env, 5)

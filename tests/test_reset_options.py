@@ -141,6 +141,14 @@ def test_a_thousand_resets_never_start_in_success():
         ),
         ({"feed": 900.0, "joint_angles": 5.0 * BENT}, "Expected a start clear of the walls, got link 6 "),
         ({"feed": 700.0, "goal": (0.0, 700.0)}, "Expected a start outside the goal's radius, "),
+        ({"goal": "abc"}, "Expected a goal in numbers, got 'abc'."),
+        ({"goal": [[1.0, 2.0], [3.0]]}, "Expected a goal in numbers, got [[1.0, 2.0], [3.0]]."),
+        ({"feed": "a"}, "Expected a feed in numbers, got 'a'."),
+        ({"feed": True}, "Expected a feed in numbers, got True."),
+        ({"feed": 900.0, "joint_angles": "a"}, "Expected joint_angles in numbers, got 'a'."),
+        ({"motion": 5}, "Expected a motion with feed and joint_angles, got 5."),
+        ({"maze": 5}, "Expected a Maze, the name of one, or a file, got 5."),
+        ([1], "Expected reset options by name, got [1]."),
         ({"state": 1, "feed": 2.0}, "Expected one of the reset options 'state' and 'feed', got both."),
         ({"maze": "L", "task_id": 2}, "Expected one of the reset options 'maze' and 'task_id', got both."),
     ],
@@ -148,9 +156,20 @@ def test_a_thousand_resets_never_start_in_success():
 )
 def test_a_bad_option_is_named(options, message):
     env = make()
+    env.reset()
     with pytest.raises(InputError, match=f"^{re.escape(message)}"):
         env.reset(options=options)
+    with pytest.raises(gym.error.ResetNeeded, match=r"as the last one was refused\.$"):
+        env.step(np.zeros(8))
     env.reset()
+    env.step(np.zeros(8))
+
+
+def test_thick_links_get_random_mazes_that_they_fit():
+    env = gym.make(ID, maze="random", link_radius=15.0).unwrapped
+    for seed in range(40):
+        env.reset(seed=seed)
+        assert env.maze.free_space.buffer(-15.0).area > 0.0
 
 
 def test_a_waypoint_beyond_the_motion_is_named():

@@ -157,21 +157,32 @@ def test_whole_episodes_are_bit_identical_in_other_processes():
 
 
 @pytest.mark.parametrize(
-    ("state", "message"),
+    ("arguments", "message"),
     [
-        ({"feed": 1.0}, "Expected a state from get_state or snapshot, got dict."),
-        (None, "Expected a state of an arm of 7 links, got one of 3."),
+        (None, "Expected a state from get_state or snapshot, got dict."),
+        ({"n_links": 3}, "Expected a state of the same arm, with n_links=7, got one with n_links=3."),
+        (
+            {"n_links": 7, "link_length": 400.0},
+            "Expected a state of the same arm, with link_length=430.0, got one with link_length=400.0.",
+        ),
+        ({"goal_radius": 60.0, "n_links": 7}, "Expected a state of the same world, with goal_radius=None, "),
+        ({"actuation": "gear", "n_links": 7}, "Expected a state of the same world, with actuation="),
     ],
+    ids=str,
 )
-def test_a_state_of_something_else_is_refused(state, message):
-    if state is None:
-        other = make(n_links=3)
+def test_a_state_of_something_else_is_refused_and_changes_nothing(arguments, message):
+    state = {"feed": 1.0}
+    if arguments is not None:
+        other = make("U40", **{"link_length": 430.0, **arguments})
         other.reset()
         state = other.get_state()
-    env = make()
-    env.reset()
-    with pytest.raises(InputError, match=f"^{message}$"):
+    env = make(n_links=7)
+    env.reset(options={"feed": 900.0})
+    before = env.observe()
+    with pytest.raises(InputError, match=f"^{message}"):
         env.set_state(state)
+    assert env.maze.name == "fig19"
+    assert np.array_equal(env.observe(), before)
 
 
 def test_a_state_of_another_maze_takes_the_environment_there():
