@@ -195,10 +195,10 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         So many steps in a row the tip must be at the goal.
     terminate_on_collision : bool
         Whether a collision ends the episode.
-    split : {"train", "test"}
-        Which random mazes; no maze is in both.
-    difficulty : tuple of two floats
-        Range of the random mazes' difficulty, within [0, 1].
+    split : {"train", "test"}, optional
+        Which random mazes, by default those to train on; no maze is in both.
+    difficulty : tuple of two floats, optional
+        Range of the random mazes' difficulty, by default (0, 1). A task has one drawn from it.
     substeps : int
         Simulated steps in one step of the environment.
     torque_limit : float, optional
@@ -241,8 +241,8 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
         goal_radius: float | None = None,
         success_hold_steps: int = 1,
         terminate_on_collision: bool = True,
-        split: str = "train",
-        difficulty: tuple[float, float] = (0.0, 1.0),
+        split: str | None = None,
+        difficulty: tuple[float, float] | None = None,
         substeps: int = 4,
         torque_limit: float | None = None,
         actuation: str = "computed_torque",

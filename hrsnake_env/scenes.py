@@ -67,9 +67,9 @@ class Scenes:
         The arm; see `HyperRedundantMazeEnv` for what None means.
     goal_radius : float, optional
         Instead of the mazes' own.
-    split : str
+    split : str, optional
         Which random mazes.
-    difficulty : tuple of two floats
+    difficulty : tuple of two floats, optional
         Of random mazes.
     physics : dict
         More arguments of `Physics`.
@@ -95,13 +95,20 @@ class Scenes:
         link_radius: float,
         joint_limit: float | None,
         goal_radius: float | None,
-        split: str,
-        difficulty: tuple[float, float],
+        split: str | None,
+        difficulty: tuple[float, float] | None,
         physics: dict[str, Any],
     ) -> None:
+        self.random = isinstance(maze, str) and maze == "random"
+        for what, value in (("split", split), ("difficulty", difficulty)):
+            if value is not None and not self.random:
+                raise InputError(f"Expected no {what} but with maze='random', got {value!r}.")
+        split, difficulty = (
+            "train" if split is None else split,
+            (0.0, 1.0) if difficulty is None else difficulty,
+        )
         check_one_of("split", split, tuple(N_TASKS))
         difficulty = checked_difficulty(difficulty)
-        self.random = isinstance(maze, str) and maze == "random"
         self._goal_radius, self._split, self._physics = goal_radius, split, physics
         self.world = {"goal_radius": goal_radius, **physics}
         self._named: dict[str, Maze] = {}

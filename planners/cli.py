@@ -87,7 +87,7 @@ def plan_command(
     as_json: JsonOption = False,
 ) -> None:
     """Plan a motion from the feeder to the goal, and check it exactly."""
-    _check_output(out)
+    _check_output(out, (".npz",))
     _check_output(picture, PICTURES)
     world, arm = Maze.load(maze), _arm(link_length, links, link_radius, joint_limit)
     start = None if warm_start is None else Motion.load(warm_start)
@@ -140,7 +140,7 @@ def longest_command(
     _check_output(out)
     _check_output(plot, PICTURES)
     _check_output(state, (".json",))
-    world, limit = Maze.load(maze), None if joint_limit is None else math.radians(joint_limit)
+    world, limit = Maze.load(maze), _radians(joint_limit)
     with _one_bar(as_json) as progress:
         result = longest.longest_link(
             world,
@@ -199,7 +199,7 @@ def simulate_command(
     from hrsnake_env.replay import save_replay
     from planners.rollout import simulate_motion  # needs the simulator, which other commands do not
 
-    _check_output(out)
+    _check_output(out, (".gif",))
     _check_output(replay, (".html",))
     world, moved = Maze.load(maze), Motion.load(motion)
     arm = _arm(moved.link_length, moved.n_links, link_radius, None)
@@ -423,6 +423,8 @@ def main() -> None:
         sys.exit(_complain(error.format_message()))  # type: ignore[attr-defined]
     except OSError as error:
         sys.exit(_complain(f"Expected files that can be read and written, got: {error}."))
+    except MemoryError as error:
+        sys.exit(_complain(f"Expected a motion that fits into memory, got: {error}. Longer links take less."))
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED
     if code == INTERRUPTED:  # typer turns Ctrl-C into this code
@@ -435,8 +437,14 @@ def _complain(message: str) -> int:
     return BAD_INPUT
 
 
+def _radians(joint_limit: float | None) -> float | None:
+    if joint_limit is not None and not 0.0 < joint_limit <= 180.0:
+        raise InputError(f"Expected --joint-limit over 0 and at most 180 degrees, got {joint_limit:g}.")
+    return None if joint_limit is None else math.radians(joint_limit)
+
+
 def _arm(link_length: float, links: int | None, link_radius: float, joint_limit: float | None) -> ArmSpec:
-    limit = None if joint_limit is None else math.radians(joint_limit)
+    limit = _radians(joint_limit)
     return ArmSpec(link_length=link_length, n_links=links, link_radius=link_radius, joint_limit=limit)
 
 

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
-import numpy as np
 
 import hrsnake_env
 from hrsnake_env.arguments import check_at_least, is_number
@@ -237,6 +236,6 @@ def _checked_levels(noises: Sequence[float]) -> tuple[float, ...]:
     if not levels:
         raise InputError(f"Expected a list of noise levels, got {noises!r}.")
     for noise in levels:
-        if not (is_number(noise) and 0.0 <= noise < np.inf):
-            raise InputError(f"Expected noise levels of at least 0, got {noise!r}.")
+        if not (is_number(noise) and 0.0 <= noise <= 1.0):
+            raise InputError(f"Expected noise levels from 0 to 1, got {noise!r}.")
     return tuple(dict.fromkeys(float(noise) for noise in levels))

@@ -251,7 +251,7 @@ def test_where_nothing_is_planned_nothing_is_written_and_the_exit_code_is_3(fold
         (["x-v0", "--env", "Maze-v0"], "Unknown environment 'Maze-v0'. Available: HyperRedundantMaze-v0, "),
         (["no version", "--env", BEND], "Expected the id of a data set as name-v0 or namespace/name-v0"),
         (["name", "--env", BEND], "Expected the id of a data set as name-v0 or namespace/name-v0"),
-        (["x-v0", "--env", BEND, "--noise", "-1"], "Expected noise levels of at least 0, got -1.0."),
+        (["x-v0", "--env", BEND, "--noise", "-1"], "Expected noise levels from 0 to 1, got -1.0."),
         (
             ["x-v0", "--env", BEND, "--episodes", "0"],
             "Expected episodes to be a whole number of at least 1, ",

@@ -354,7 +354,7 @@ def test_a_bad_action_is_named(action, message):
         ({"observation": "image", "rays": True}, "Expected rays=False with observation 'image', got True."),
         ({"action": "x"}, "Unknown action 'x'. Available: 'delta', 'absolute'."),
         ({"reward_type": "x"}, "Unknown reward_type 'x'. Available: 'dense', 'sparse'."),
-        ({"split": "x"}, "Unknown split 'x'. Available: 'train', 'test'."),
+        ({"maze": "random", "split": "x"}, "Unknown split 'x'. Available: 'train', 'test'."),
         (
             {"contact_penalty": -0.1},
             "Expected contact_penalty to be a finite number of at least 0, got -0.1.",
@@ -365,13 +365,14 @@ def test_a_bad_action_is_named(action, message):
         ({"rays": "no"}, "Expected rays to be True or False, got 'no'."),
         ({"terminate_on_collision": None}, "Expected terminate_on_collision to be True or False, got None."),
         ({"maze": 5}, "Expected a Maze, the name of one, or a file, got 5."),
-        ({"split": []}, "Unknown split []. Available: 'train', 'test'."),
+        ({"maze": "random", "split": []}, "Unknown split []. Available: 'train', 'test'."),
         ({"torque_limit": "a"}, "Expected a positive torque_limit, or None, got 'a'."),
         (
             {"link_length": 1e-3},
             "Expected a link_length with which 1000 links reach the goal, or n_links, got ",
         ),
-        ({"difficulty": 0.5}, "Expected a range of difficulties in [0, 1], got 0.5."),
+        ({"maze": "random", "difficulty": 0.5}, "Expected a range of difficulties in [0, 1], got 0.5."),
+        ({"difficulty": (0.0, 0.3)}, "Expected no difficulty but with maze='random', got (0.0, 0.3)."),
         (
             {"maze": "random", "difficulty": (0, 1, 2)},
             "Expected a range of difficulties in [0, 1], got (0, 1, 2).",
