@@ -38,7 +38,7 @@ kernels: $(VENV)/.all
 
 ## oldest: the environment's tests with the oldest versions that pyproject.toml allows
 oldest: $(OLD)/.all
-	$(OLD)/bin/python -m pytest tests/test_env.py tests/test_workers.py tests/test_reset_options.py tests/test_save_restore.py
+	$(OLD)/bin/python -m pytest tests/test_env.py tests/test_workers.py
 
 ## lint, types, contracts: what CI checks besides the tests
 lint: $(VENV)/.all
