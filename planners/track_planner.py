@@ -437,7 +437,7 @@ def _unsolved(track: _Track, scene: Scene, query: Query, timings: Mapping[str, f
         path_position = float(query.geometry.path.s[nearest])
     why = REASONS[-1 if kind is None or track.slips else kind]
     if track.chord < 1.0:
-        why += f"; links of up to about {track.chord * scene.length:.4g} would pass"
+        why += f"; this track is free for links of up to about {track.chord * scene.length:.4g}"
     late = " when time ran out" if query.late else ""
     return Candidate(
         status=PlanningStatus.OUT_OF_TIME if query.late else PlanningStatus.DEAD_END,
