@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.task import FEED_STEP, JOINT_STEP
+from planners.motion_cache import maze_key
 from planners.planning import plan
 from planners.problem import Motion, PlanningResult
 
@@ -187,7 +188,7 @@ class PlanningPolicy:
 
     def _plan(self, k: int) -> PlannedPolicy | None:
         maze, arm, action = (self._attribute(name, k) for name in ("maze", "arm", "action_mode"))
-        key = maze.free_space.wkb + np.array([*maze.base_pose, *maze.goal, maze.goal_radius]).tobytes()
+        key = maze_key(maze)
         if key not in self._known:
             self._known[key] = plan(maze, arm, planner=self.planner, explain=False)
             self.results.append(self._known[key])

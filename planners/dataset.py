@@ -37,8 +37,10 @@ class Recording:
         By noise level, whether each episode reached the goal; those that were not kept count, too.
     n_episodes, n_steps : int
         Kept.
+    n_links, link_length : int and float
+        Of the arm; lengths are in maze units.
     unplanned : int
-        Starts in mazes without a plan.
+        Mazes without a plan.
     random_return, expert_return : float or None
         Mean returns of random actions and of the noiseless planner; None if nothing was planned.
     seconds : float
@@ -51,6 +53,8 @@ class Recording:
     successes: dict[float, list[bool]]
     n_episodes: int
     n_steps: int
+    n_links: int
+    link_length: float
     unplanned: int
     random_return: float | None
     expert_return: float | None
@@ -72,7 +76,11 @@ class Recording:
         for noise, all_ in self.successes.items():
             yield f"noise {noise:g}", f"{sum(all_)} of {len(all_)} episodes reached the goal"
         if self.unplanned:
-            yield "without a plan", f"{self.unplanned} mazes, left out"
+            arm = f"{self.n_links} links of {self.link_length:g}"
+            yield (
+                "without a plan",
+                f"{self.unplanned} mazes, left out: no motion for an arm of {arm} was found",
+            )
         if self.expert_return is not None:
             yield "mean return", f"{self.expert_return:.4g} planner, {self.random_return:.4g} random actions"
         yield "time", f"{self.seconds:.3g} s"
@@ -194,6 +202,8 @@ def record_dataset(
         successes=writer.successes,
         n_episodes=writer.n_episodes,
         n_steps=writer.n_steps,
+        n_links=env.unwrapped.arm.n_links,  # type: ignore[attr-defined]
+        link_length=env.unwrapped.arm.link_length,  # type: ignore[attr-defined]
         unplanned=writer.unplanned,
         random_return=mean_return(writer.random_returns),
         expert_return=mean_return(writer.expert_returns),

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 import hrsnake_env
 from planners.demonstrator import Demonstrator
+from planners.motion_cache import maze_key
 
 __all__ = ["DatasetWriter", "mean_return"]
 
@@ -77,14 +78,20 @@ class DatasetWriter:
         self.successes: dict[float, list[bool]] = {}
         self.random_returns: list[float] = []
         self.expert_returns: list[float] = []
-        self.n_episodes = self.n_steps = self.unplanned = 0
+        self.n_episodes = self.n_steps = 0
+        self._unplanned: set[bytes] = set()
+
+    @property
+    def unplanned(self) -> int:
+        """Number of mazes without a plan."""
+        return len(self._unplanned)
 
     def add(self, seed: int, maze: str | None, levels: Sequence[float], *, first: bool) -> None:
         """Play from one start at every noise level, and for the reference scores."""
         options = None if maze is None else {"maze": maze}
         _, info = self.env.reset(seed=seed, options=options)
         if not self.demonstrator.begin():
-            self.unplanned += 1
+            self._unplanned.add(maze_key(self.env.unwrapped.maze))  # type: ignore[attr-defined]
             return
         # Without noise, episodes in the same maze are all alike: one of them will do.
         fresh = first or info["task_id"] >= 0
