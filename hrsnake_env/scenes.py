@@ -103,12 +103,9 @@ class Scenes:
         for what, value in (("split", split), ("difficulty", difficulty)):
             if value is not None and not self.random:
                 raise InputError(f"Expected no {what} but with maze='random', got {value!r}.")
-        split, difficulty = (
-            "train" if split is None else split,
-            (0.0, 1.0) if difficulty is None else difficulty,
-        )
+        split = "train" if split is None else split
         check_one_of("split", split, tuple(N_TASKS))
-        difficulty = checked_difficulty(difficulty)
+        difficulty = checked_difficulty((0.0, 1.0) if difficulty is None else difficulty)
         self._goal_radius, self._split, self._physics = goal_radius, split, physics
         self.world = {"goal_radius": goal_radius, **physics}
         self._named: dict[str, Maze] = {}
@@ -159,14 +156,14 @@ class Scenes:
             ), NO_TASK
         if wanted.task_id is not None:
             return self._task_scene(wanted.task_id, wanted.goal), wanted.task_id
-        for left in reversed(range(N_TRIES)):
+        refusal = InputError("")
+        for _ in range(N_TRIES if wanted.goal is None else 1):
             task_id = int(rng.integers(N_TASKS[self._split]))
             try:
                 return self._task_scene(task_id, wanted.goal), task_id
-            except InputError:
-                if left == 0 or wanted.goal is not None:
-                    raise
-        raise AssertionError("unreachable")
+            except InputError as error:
+                refusal = error
+        raise refusal
 
     def _task_scene(self, task_id: int, goal: FloatArray | None) -> Scene:
         return self.of(self._with_goal(task_maze(self._split, task_id, **self._task), goal))
