@@ -27,6 +27,8 @@ SHAPES = {
     "u-turn": "N E240 S",
     "s-bend": "N E400 N",
     "zigzag": "N E240 S E240 N",
+    "u-turn-long": "N E240 S",
+    "u-turn-deep": "N3000 E240 S2500",
 }
 """Compass directions of the legs; those without a length in px grow with the link."""
 
@@ -37,8 +39,22 @@ leg of 1.5 is too short: the first link is in the turn while the second one cann
 RIGHT_ANGLE = 2.0 * math.sqrt(2.0) * WIDTH
 """The longest rod that passes a right-angled bend, in px."""
 
-RODS = {"straight": math.inf, "bend": RIGHT_ANGLE, "u-turn": 440.0, "s-bend": RIGHT_ANGLE, "zigzag": 440.0}
-"""The longest rods that pass the shapes if their legs are long, in px; 440 is two widths and the wall."""
+U_TURN = 2.0 * WIDTH + 40.0
+"""The longest rod that passes a U-turn around a wall of 40 px, in px."""
+
+RODS = {
+    "straight": math.inf,
+    "bend": RIGHT_ANGLE,
+    "u-turn": U_TURN,
+    "s-bend": RIGHT_ANGLE,
+    "zigzag": U_TURN,
+    "u-turn-long": U_TURN,
+    "u-turn-deep": U_TURN,
+}
+"""The longest rods that pass the shapes if their legs are long, in px."""
+
+LONGER = {"u-turn-long": 2.3}
+"""Factor by which the growing legs of these shapes are longer."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,7 +87,7 @@ class Rung:
         return self.link_length / self.longest_rod
 
 
-def rung_maze(shape: str, link_length: float, *, name: str = "rung", longer: float = 1.0) -> Maze:
+def rung_maze(shape: str, link_length: float, *, name: str = "rung", longer: float | None = None) -> Maze:
     """Build the maze of a short rung.
 
     Parameters
@@ -82,9 +98,10 @@ def rung_maze(shape: str, link_length: float, *, name: str = "rung", longer: flo
         In px.
     name : str
         Of the maze.
-    longer : float
-        Factor by which the legs are longer that grow with the link.
+    longer : float, optional
+        Factor by which the legs are longer that grow with the link; by default the shape's own.
     """
+    longer = LONGER.get(shape, 1.0) if longer is None else longer
     legs = SHAPES[shape].split()
     grown = [FIRST, *[INNER] * (len(legs) - 2), LAST] if len(legs) > 1 else [INNER]
     lengths = [float(leg[1:] or longer * links * link_length) for leg, links in zip(legs, grown, strict=True)]
@@ -132,6 +149,13 @@ RUNGS = (
     _short("s-bend", 420.0, 5, "Nearly the longest link with a known motion: a quarter below the rod."),
     _short("zigzag", 132.0, 7, "Two loose U-turns to opposite sides."),
     _short("zigzag", 352.0, 8, "Two tight U-turns to opposite sides."),
+    _short("u-turn-long", 300.0, 9, "Long legs: half a dozen links more to keep in mind at a U-turn."),
+    _short("u-turn-long", 400.0, 9, "The same with a tenth of the longest rod to spare."),
+    _short("u-turn-deep", 100.0, 55, "Legs of 3000 px, as the paper's: many short links."),
+    _short("u-turn-deep", 200.0, 28, "The same with links of nearly half the longest rod."),
+    _short("u-turn-deep", 300.0, 19, "The same with links of two thirds of the longest rod."),
+    _short("u-turn-deep", 400.0, 15, "The same with a tenth of the longest rod to spare."),
+    _short("u-turn-deep", 435.6, 14, "The same with a hundredth of the longest rod to spare."),
     _papers("fig19", 6, 440.0, "The paper's benchmark."),
     _papers("fig17b", 21, 242.0, "A tight U-turn, then a hall of pillars with many ways."),
     _papers("fig17c", 16, 297.6, "Rounded S-bends and a hall between them."),

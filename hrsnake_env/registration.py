@@ -16,6 +16,9 @@ ENTRY_POINT = "hrsnake_env.env:HyperRedundantMazeEnv"
 STEPS_PER_LINK = 200
 """Time limit of a task. Feeding one link takes 50 steps, planned motions at most twice that."""
 
+LONG_ARM, LONG_DIFFICULTY = 30, (0.7, 1.0)
+"""Links and difficulties of the long random mazes, which have ten bends and more."""
+
 
 def _task_name(maze: str) -> str:
     """Return the part of an id that names a maze.
@@ -44,9 +47,17 @@ def _random(split: str) -> dict[str, Any]:
     }
 
 
+def _random_long(split: str) -> dict[str, Any]:
+    return {
+        "max_episode_steps": STEPS_PER_LINK * LONG_ARM,
+        "kwargs": {"maze": "random", "split": split, "n_links": LONG_ARM, "difficulty": LONG_DIFFICULTY},
+    }
+
+
 def _environments() -> dict[str, dict[str, Any]]:
     tasks = {_task_name(rung.maze): _rung(rung) for rung in LADDER.values()}
     tasks |= {f"Random{split.capitalize()}": _random(split) for split in N_TASKS}
+    tasks |= {f"RandomLong{split.capitalize()}": _random_long(split) for split in N_TASKS}
     table: dict[str, dict[str, Any]] = {"HyperRedundantMaze-v0": {"max_episode_steps": 10_000, "kwargs": {}}}
     for name, task in tasks.items():
         for suffix, reward_type in (("", "dense"), ("-Sparse", "sparse")):

@@ -12,7 +12,7 @@ import numpy as np
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
-from planners.baselines.path_following import plan_path_following
+from planners.baselines import BASELINES
 from planners.beam_planner import plan_as_printed, plan_beam
 from planners.obstruction import wall_nearest_to
 from planners.portfolio import Question, first_questions, further_questions
@@ -39,7 +39,7 @@ PLANNERS: dict[str, Callable[[Query], Candidate]] = {
     "as-printed": plan_as_printed,
     "sweep": plan_sweep,
     "track": plan_track,
-    "follow": plan_path_following,  # to compare with; `auto` does not ask it
+    **BASELINES,  # to compare with; `auto` does not ask them
 }
 """All planners by name."""
 
@@ -57,6 +57,7 @@ def plan(
     *,
     time_budget: float = TIME_BUDGET,
     warm_start: Motion | None = None,
+    seed: int = 0,
     explain: bool = True,
     progress: Progress | None = None,
 ) -> PlanningResult:
@@ -76,6 +77,8 @@ def plan(
     warm_start : Motion, optional
         A motion of links of this length in a similar maze (the goal or a wall has moved): planning starts
         from it, which takes milliseconds where the change is small.
+    seed : int
+        Of planners that draw random numbers; not negative.
     explain : bool
         Without a plan, find out what is in the way, and the longest link that would pass there.
     progress : callable, optional
@@ -102,13 +105,21 @@ def plan(
         raise InputError(f"Unknown planner {planner!r}. Available: auto, {', '.join(PLANNERS)}.")
     if not time_budget > 0.0:
         raise InputError(f"Expected a positive time_budget in seconds, got {time_budget!r}.")
+    if not (isinstance(seed, int | np.integer) and seed >= 0):
+        raise InputError(f"Expected a whole seed of at least 0, got {seed!r}.")
     maze.check_arm(arm)
     if warm_start is not None:
         _check_warm_start(warm_start, maze, arm)
     deadline = time.perf_counter() + time_budget
     checker = _Checker(maze, arm, deadline, progress)
     query = Query(
-        maze=maze, arm=arm, deadline=deadline, checker=checker, refused=checker.refused, progress=progress
+        maze=maze,
+        arm=arm,
+        deadline=deadline,
+        seed=int(seed),
+        checker=checker,
+        refused=checker.refused,
+        progress=progress,
     )
     hearing, proof = _Hearing(checker), ""
     if planner != "auto":

@@ -38,6 +38,8 @@ class Query:
         Whether to try everything; otherwise what takes more than some tenths of a second is left.
     checker : callable or None
         Says of a motion whether it is valid, as `planners.validation.validate` does.
+    seed : int
+        Of planners that draw random numbers; not negative.
     refused : list of Motion
         What the checker has refused so far.
     progress : callable or None
@@ -54,6 +56,7 @@ class Query:
     route: FloatArray | None = None
     thorough: bool = True
     checker: Callable[[Motion], ValidationReport] | None = None
+    seed: int = 0
     refused: list[Motion] = field(default_factory=list, repr=False)
     progress: Progress | None = None
     surveys: dict[int, Geometry | None] = field(default_factory=dict, repr=False)
