@@ -30,7 +30,7 @@ from planners.survey import Geometry
 
 __all__ = ["b_spline", "beside", "plan_b_spline"]
 
-DEVIATIONS = (0.02, 0.05, 0.1, 0.2)
+DEVIATIONS = (0.005, 0.02, 0.05, 0.1)
 """Mean deviation of the curve from the path, in passage widths; all are tried."""
 
 SHIFTS = (1.0, 0.75, 0.5, 0.25, 0.0)

@@ -30,10 +30,10 @@ from planners.survey import Geometry
 
 __all__ = ["outer_line", "plan_outer_wall"]
 
-SHARES = (0.99, 0.9, 0.75, 0.5, 0.25)
+SHARES = (0.997, 0.98, 0.9, 0.7, 0.4)
 """How far out the curve runs, in beam lengths; all are tried."""
 
-HELD = (0.3, 0.45, 0.1, 0.0)
+HELD = (0.3, 0.38, 0.45, 0.15)
 """How much of the way between two bends the curve still keeps to the wall, at each end."""
 
 LONGEST_BEAMS = (1.5, 0.75)

@@ -23,6 +23,7 @@ __all__ = ["Stuck", "Trial", "best_of", "fed_along"]
 POSES, PLACES = 300, 9
 """Poses, and places on each link, at which the depth of a motion in the walls is looked at: enough to rank."""
 
+BACK = "the arm behind it would have to go back into the feeder for it to advance"
 JUMP = "a joint behind it would have to jump along the track to stay a link length behind"
 
 
@@ -61,6 +62,10 @@ def fed_along(track: FloatArray, link_length: float, base_pose: FloatArray) -> T
     fed = feed(track, link_length, base_pose)
     if fed.ending != kernel.DONE:
         return Stuck(why=JUMP, joints=fed.poses[-1])
+    # Links behind the base at the end have been left out: were they out of the feeder before?
+    forward = (fed.poses[:, 0] - base_pose[:2]) @ (np.cos(base_pose[2]), np.sin(base_pose[2]))
+    if forward.max() > 1e-9 * link_length:
+        return Stuck(why=BACK, joints=fed.poses[int(np.argmax(forward))])
     return motion_of(fed.poses, link_length, base_pose)
 
 
