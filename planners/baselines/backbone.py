@@ -26,7 +26,7 @@ from planners.baselines.path_following import STOP, followed_track
 from planners.baselines.trials import Stuck, Trial, best_of
 from planners.kernels import backbone as kernel
 from planners.kernels.types import FloatArray
-from planners.path import Path, arclength, resampled, tangents, windowed
+from planners.path import arclength, resampled, tangents, windowed
 from planners.problem import Candidate, Motion
 from planners.query import Query
 from planners.survey import Geometry
@@ -44,6 +44,10 @@ STEP = 0.03
 
 MORE_LINKS = 1.5
 """Most links that there is room for, times those that are as long as the curve."""
+
+NEAR = 0.9
+"""Where the tip does not come so near to the goal that the motion ends there (`STOP`), it ends where the tip is
+nearest, if it is this near, in goal radii."""
 
 CHUNK = 500
 """Poses between two looks at the clock."""
@@ -78,25 +82,27 @@ def plan_backbone(query: Query) -> Candidate:
 def _trials(query: Query, geometry: Geometry) -> Iterator[Trial]:
     """Lead the arm along one curve after the other, as long as there is time."""
     maze, length = geometry.maze, float(query.arm.link_length)
+    track = followed_track(geometry.path.points, length, maze.base_pose, maze.goal, 0.0)
+    track = (track - maze.base_pose[:2]) / length
     for number, window in enumerate(WINDOWS):
         query.tell("plan", number / len(WINDOWS))
-        curve = backbone_curve(geometry.path, window)
-        track = followed_track(curve, length, maze.base_pose, maze.goal, 0.0)
-        trial = _led(query, track)
+        trial = _led(query, backbone_curve(track, window * geometry.path.width / length))
         if trial is None:
             return
         yield trial
 
 
-def backbone_curve(path: Path, window: float) -> FloatArray:
-    """Smooth a path, shape (n, 2), by a moving average some passage widths wide."""
-    return windowed(path.points, round(0.5 * window * path.width / float(path.s[1])))
+def backbone_curve(track: FloatArray, window: float) -> FloatArray:
+    """Smooth a track, shape (n, 2), by a moving average; track and window are in link lengths.
+
+    The end of the feeder's axis is smoothed as well: the curve is not to be followed there, but to be near.
+    """
+    return windowed(resampled(track, SPACING), round(0.5 * window / SPACING))
 
 
-def _led(query: Query, track: FloatArray) -> Trial | None:
-    """Lead the arm along a track that begins with the feeder's axis; None if time runs out."""
+def _led(query: Query, curve: FloatArray) -> Trial | None:
+    """Lead the arm along a curve, in link lengths, that begins at the base; None if time runs out."""
     maze, length = query.maze, float(query.arm.link_length)
-    curve = resampled((track - maze.base_pose[:2]) / length, SPACING)
     along, axis = tangents(curve), float(maze.base_pose[2])
     normals = np.column_stack([-along[:, 1], along[:, 0]])
     n_links = math.ceil(MORE_LINKS * arclength(curve)[-1]) + 2
@@ -111,8 +117,13 @@ def _led(query: Query, track: FloatArray) -> Trial | None:
         n, ending = kernel.lead_along(
             curve, normals, axis, goal, stop, FEEDER_RELEASE, STEP, n, n + CHUNK, feeds, headings, joints, nearest
         )  # fmt: skip
-    out = feeds[n - 1] // kernel.TICKS
+    if ending == kernel.PAST:
+        motion = _motion(feeds[:n], headings[:n], maze.base_pose, length)
+        away = np.hypot(*(motion.joints[:, -1] - maze.goal).T)
+        if away.min() <= NEAR * maze.goal_radius:
+            n, ending = int(np.argmin(away)) + 1, kernel.DONE
     if ending != kernel.DONE:
+        out = feeds[n - 1] // kernel.TICKS
         return Stuck(why=WHY[ending], joints=maze.base_pose[:2] + length * joints[: out + 1][::-1])
     return _motion(feeds[:n], headings[:n], maze.base_pose, length)
 

@@ -14,8 +14,12 @@ the goal; without room for poses; at the number of poses at which it was to paus
 TICKS = 4096
 """Smallest feed between poses, as a part of a link: a power of two, so that no release is stepped over."""
 
-STRIDE = TICKS // 64
-"""Largest feed between poses, in ticks."""
+STRIDE, LEAST_STRIDE = TICKS // 64, TICKS // 1024
+"""Largest feed between poses, in ticks, and the one at which joints that still move too far are turned over:
+where the fit is least at two places, it changes from one to the other."""
+
+SLOWLY, MOST_PARTS = 1.5, 40
+"""Poses per largest movement that turning over takes, and most of them: no link swings far."""
 
 SAMPLES = 4
 """Places on each link whose distance from the curve counts, the end included and the start not."""
@@ -136,6 +140,24 @@ def _moved(n: int, joints: FloatArray, earlier: FloatArray) -> float:
 
 
 @njit(cache=True)
+def _turn_over(n_poses: int, steps: float, feeds: IntArray, headings: FloatArray) -> int:
+    """Put poses before pose `n_poses`, at the feed of the pose before it, that turn all links evenly to it.
+
+    Returns the new place of the pose, or minus the old one if it is so far away that links would swing round.
+    """
+    parts = int(np.ceil(SLOWLY * steps))
+    if parts > MOST_PARTS:
+        return -n_poses
+    parts = min(parts, feeds.shape[0] - n_poses)
+    headings[n_poses + parts - 1] = headings[n_poses]
+    for part in range(1, parts):
+        share = part / parts
+        headings[n_poses + part - 1] = (1.0 - share) * headings[n_poses - 1] + share * headings[n_poses + parts - 1]
+        feeds[n_poses + part - 1] = feeds[n_poses - 1]
+    return n_poses + parts - 1
+
+
+@njit(cache=True)
 def lead_along(
     curve: FloatArray, normals: FloatArray, axis: float, goal: FloatArray, stop: float, release: float,
     step: float, begin: int, pause: int, feeds: IntArray, headings: FloatArray, joints: FloatArray,
@@ -187,11 +209,14 @@ def lead_along(
         past = (feed - n * TICKS) / TICKS
         _fit(curve, normals, n, past, axis, release, headings[n_poses], now, at)
         # The joint behind the last one has come out just now or is on the axis.
-        if _moved(n, now, joints) > step:
-            if stride == 1:
-                return n_poses, JUMP
-            stride //= 2
-            continue
+        moved = _moved(n, now, joints)
+        if moved > step:
+            if stride > LEAST_STRIDE:
+                stride //= 2
+                continue
+            n_poses = _turn_over(n_poses, moved / step, feeds, headings)
+            if n_poses < 0:
+                return -n_poses, JUMP
         joints[:], nearest[:], feeds[n_poses] = now, at, feed
         n_poses += 1
         x, y = joints[0]
