@@ -1,15 +1,15 @@
-"""B-splines: the path is approximated by a B-spline curve, and the links stay nearly tangent to it, to compare with.
+"""B-splines: the links stay nearly tangent to a B-spline curve along the path, to compare with.
 
-A curve based method in the sense of the paper's introduction: reference 11, by the paper's authors, of which it
-says that "the path could be approximated by B-spline curves" and that the algorithm "keeps the links of the
-hyper-redundant manipulator approximately tangent to these curves, thereby follows the path successfully". What
-is here is built from these two sentences alone.
+A curve based method in the sense of the paper's introduction: reference 11, by the paper's authors, of
+which it says that "the path could be approximated by B-spline curves" and that the algorithm "keeps the
+links of the hyper-redundant manipulator approximately tangent to these curves, thereby follows the path
+successfully". What is here is built from these two sentences alone.
 
-A link is tangent to a bend if its joints lie outside it. So all joints run on a track beside the curve: it is
-shifted outward by how far a chord of the curve, a link long, has its middle inside it. That makes links tangent
-where the curvature hardly changes within a link, and it is why they are so approximately only. How smooth the
-curve is, and how much of the shift is made (all: tangent; none: link ends on the curve), is tried. Nothing is
-done about the walls.
+A link is tangent to a bend if its joints lie outside it. So all joints run on a track beside the curve: it
+is shifted outward by how far a chord of the curve, a link long, has its middle inside it. That makes links
+tangent where the curvature hardly changes within a link, and it is why they are so approximately only. How
+smooth the curve is, and how much of the shift is made (all: tangent; none: link ends on the curve), is
+tried. Nothing is done about the walls.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def beside(curve: FloatArray, link_length: float, shift: float) -> FloatArray:
     """
     s = arclength(curve)
     half = np.minimum(0.5 * link_length, np.minimum(s, s[-1] - s))
-    before, after = (
-        np.column_stack([np.interp(s + sign * half, s, curve[:, k]) for k in range(2)]) for sign in (-1.0, 1.0)
-    )
-    return np.asarray(curve + shift * (curve - 0.5 * (before + after)))
+    middles = [
+        0.5 * (np.interp(s - half, s, curve[:, k]) + np.interp(s + half, s, curve[:, k])) for k in range(2)
+    ]
+    return np.asarray(curve + shift * (curve - np.column_stack(middles)))

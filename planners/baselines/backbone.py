@@ -1,17 +1,17 @@
 """The backbone: links are fitted by least squares to a smooth curve that leads them, to compare with.
 
-A curve based method in the sense of the paper's introduction: reference 13, of which it says that "a backbone
-curve whose length is constant can be obtained", that the "configuration of a manipulator with discrete links
-can be fitted to this curve as closely as possible", and that few links and large curvatures are bad for it. It
-moves by following the leader, as the introduction says of references 19 and 34. What is here is built from
-these sentences alone.
+A curve based method in the sense of the paper's introduction: reference 13, of which it says that "a
+backbone curve whose length is constant can be obtained", that the "configuration of a manipulator with
+discrete links can be fitted to this curve as closely as possible", and that few links and large curvatures
+are bad for it. It moves by following the leader, as the introduction says of references 19 and 34. What is
+here is built from these sentences alone.
 
-The curve is the path, smoothed by a moving average, which bounds its curvature. The arm is a constant length of
-it, from the feeder on; as it is pushed in, all links past the base are fitted at once, for every pose: the sum
-of the squared distances of places on the links from the curve is least near the pose before. So joints are
-outside bends, and the middles of links inside. Only distances across the curve count, since links that stay as
-long as their piece of the curve would have to zigzag after every bend. How smooth the curve is, is tried;
-nothing is done about the walls.
+The curve is the path, smoothed by a moving average, which bounds its curvature. The arm is a constant
+length of it, from the feeder on; as it is pushed in, all links past the base are fitted at once, for every
+pose: the sum of the squared distances of places on the links from the curve is least near the pose before.
+So joints are outside bends, and the middles of links inside. Only distances across the curve count, since
+links that stay as long as their piece of the curve would have to zigzag after every bend. How smooth the
+curve is, is tried; nothing is done about the walls.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ MORE_LINKS = 1.5
 """Most links that there is room for, times those that are as long as the curve."""
 
 NEAR = 0.9
-"""Where the tip does not come so near to the goal that the motion ends there (`STOP`), it ends where the tip is
-nearest, if it is this near, in goal radii."""
+"""Where the tip does not come within `STOP` of the goal, the motion ends where it is nearest, if it is this
+near, in goal radii."""
 
 CHUNK = 500
 """Poses between two looks at the clock."""
@@ -115,7 +115,8 @@ def _led(query: Query, curve: FloatArray) -> Trial | None:
         if query.late:
             return None
         n, ending = kernel.lead_along(
-            curve, normals, axis, goal, stop, FEEDER_RELEASE, STEP, n, n + CHUNK, feeds, headings, joints, nearest
+            curve, normals, axis, goal, stop, FEEDER_RELEASE, STEP, n, n + CHUNK,
+            feeds, headings, joints, nearest,
         )  # fmt: skip
     if ending == kernel.PAST:
         motion = _motion(feeds[:n], headings[:n], maze.base_pose, length)

@@ -1,16 +1,16 @@
 """The outer wall: every joint keeps to the outer wall of the bends, to compare with.
 
-The paper's introduction divides planners into Jacobian based, curve based, geometric and path tracking ones;
-this is a path tracking one that knows about walls. It is what remains of the paper's section 3.3, the
-"closest edge side" in a bend, when the two choices that section makes for every link, tangent or edge and left
-or right, are made once, for a fixed curve: the path, shifted along its beams to the outer side of the bends,
-and across the corridor between bends of opposite sides. All joints run on that curve. A link that slides with
-both ends along the outer walls of a bend has all the room that there is, so one U-turn takes it nearly to the
-longest possible link.
+The paper's introduction divides planners into Jacobian based, curve based, geometric and path tracking
+ones; this is a path tracking one that knows about walls. It is what remains of the paper's section 3.3, the
+"closest edge side" in a bend, when the two choices that section makes for every link, tangent or edge and
+left or right, are made once, for a fixed curve: the path, shifted along its beams to the outer side of the
+bends, and across the corridor between bends of opposite sides. All joints run on that curve. A link that
+slides with both ends along the outer walls of a bend has all the room that there is, so one U-turn takes it
+nearly to the longest possible link.
 
-It does not look at the arm: where opposite bends follow each other so closely that a link is in both, no curve
-that keeps to the outer walls is right for it, and walls are met. How near to the walls, and how much of the way
-between bends is used for crossing over, is tried; nothing is shaped.
+It does not look at the arm: where opposite bends follow each other so closely that a link is in both, no
+curve that keeps to the outer walls is right for it, and walls are met. How near to the walls, and how much
+of the way between bends is used for crossing over, is tried; nothing is shaped.
 """
 
 from __future__ import annotations

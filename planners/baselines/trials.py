@@ -1,4 +1,4 @@
-"""Trying variants of a method: the first motion that is valid, otherwise the one that is least deep in walls."""
+"""Trying variants of a method: the first motion that is valid, otherwise the one least deep in walls."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from planners.survey import Geometry
 __all__ = ["Stuck", "Trial", "best_of", "fed_along"]
 
 POSES, PLACES = 300, 9
-"""Poses, and places on each link, at which the depth of a motion in the walls is looked at: enough to rank."""
+"""Poses, and places on each link, at which a motion's depth in the walls is looked at: enough to rank."""
 
 BACK = "the arm behind it would have to go back into the feeder for it to advance"
 JUMP = "a joint behind it would have to jump along the track to stay a link length behind"

@@ -8,8 +8,8 @@ from numba import njit
 from planners.kernels.types import FloatArray, IntArray
 
 DONE, JUMP, PAST, FULL, PAUSED = 0, 1, 2, 3, 4
-"""How leading a chain along a curve ends: with the tip at the goal; where a joint would jump; with the tip past
-the goal; without room for poses; at the number of poses at which it was to pause."""
+"""How leading a chain along a curve ends: with the tip at the goal; where a joint would jump; with the tip
+past the goal; without room for poses; at the number of poses at which it was to pause."""
 
 TICKS = 4096
 """Smallest feed between poses, as a part of a link: a power of two, so that no release is stepped over."""
@@ -80,9 +80,10 @@ def _normal_equations(
             aside = nx * (x - curve[k, 0]) + ny * (y - curve[k, 1])
             sum_xx, sum_xy, sum_yy = sum_xx + nx * nx, sum_xy + nx * ny, sum_yy + ny * ny
             sum_rx, sum_ry = sum_rx + nx * aside, sum_ry + ny * aside
-            one_xx, one_xy, one_yy = one_xx + share * nx * nx, one_xy + share * nx * ny, one_yy + share * ny * ny
-            one_rx, one_ry = one_rx + share * nx * aside, one_ry + share * ny * aside
-            two += (share * (ny * ex - nx * ey)) ** 2
+            sx, sy = share * nx, share * ny
+            one_xx, one_xy, one_yy = one_xx + sx * nx, one_xy + sx * ny, one_yy + sy * ny
+            one_rx, one_ry = one_rx + sx * aside, one_ry + sy * aside
+            two += (sy * ex - sx * ey) ** 2
         matrix[i, i] = two + ey * ey * xx - 2.0 * ey * ex * xy + ex * ex * yy
         vx = -ey * (one_xx + xx) + ex * (one_xy + xy)
         vy = -ey * (one_xy + xy) + ex * (one_yy + yy)
@@ -133,10 +134,10 @@ def _fit(
 @njit(cache=True)
 def _moved(n: int, joints: FloatArray, earlier: FloatArray) -> float:
     """Return how far the first n joints have moved at most."""
-    most = 0.0
+    most: float = 0.0
     for i in range(n):
-        most = max(most, (joints[i, 0] - earlier[i, 0]) ** 2 + (joints[i, 1] - earlier[i, 1]) ** 2)
-    return np.sqrt(most)
+        most = max(most, np.hypot(joints[i, 0] - earlier[i, 0], joints[i, 1] - earlier[i, 1]))
+    return most
 
 
 @njit(cache=True)
@@ -145,16 +146,17 @@ def _turn_over(n_poses: int, steps: float, feeds: IntArray, headings: FloatArray
 
     Returns the new place of the pose, or minus the old one if it is so far away that links would swing round.
     """
-    parts = int(np.ceil(SLOWLY * steps))
+    parts: int = int(np.ceil(SLOWLY * steps))
     if parts > MOST_PARTS:
         return -n_poses
     parts = min(parts, feeds.shape[0] - n_poses)
-    headings[n_poses + parts - 1] = headings[n_poses]
+    before, pose = n_poses - 1, n_poses + parts - 1
+    headings[pose] = headings[n_poses]
     for part in range(1, parts):
         share = part / parts
-        headings[n_poses + part - 1] = (1.0 - share) * headings[n_poses - 1] + share * headings[n_poses + parts - 1]
-        feeds[n_poses + part - 1] = feeds[n_poses - 1]
-    return n_poses + parts - 1
+        headings[before + part] = (1.0 - share) * headings[before] + share * headings[pose]
+        feeds[before + part] = feeds[before]
+    return pose
 
 
 @njit(cache=True)
