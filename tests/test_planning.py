@@ -13,6 +13,7 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import fig19, serpentine
 from planners import PLANNERS, PlanningStatus, plan, planning, validate
+from planners.baselines import BASELINES
 from planners.portfolio import Question
 from planners.problem import Candidate
 from planners.query import Query
@@ -20,11 +21,11 @@ from planners.survey import survey
 
 EVERY = pytest.mark.parametrize("planner", PLANNERS)
 
-TIGHT = [name for name in PLANNERS if name != "follow"]
-"""Planners that claim links near the limit; path following does not."""
+TIGHT = [name for name in PLANNERS if name not in BASELINES]
+"""Planners that claim links near the limit; those to compare with do not."""
 
 SHORT = 120.0
-"""A length that path following solves, too."""
+"""A length that those to compare with solve, too."""
 
 
 def claimed(planner, length):
@@ -117,7 +118,8 @@ def test_extra_links_stay_in_the_feeder(benchmark):
 
 @EVERY
 def test_too_few_links_are_refused_with_the_number_it_takes(planner):
-    length, number = claimed(planner, 430.0), "[67]" if planner in TIGHT else "19"
+    # The path takes 19 short links; along the outer wall, and outside bends, the way is longer.
+    length, number = claimed(planner, 430.0), "[67]" if planner in TIGHT else "(19|2[04])"
     with pytest.raises(InputError, match=rf"Expected at least {number} links of {length:g} px .* got 5"):
         plan(fig19(), ArmSpec(link_length=length, n_links=5), planner=planner)
 
@@ -137,7 +139,7 @@ def test_a_planner_that_needs_fewer_links_is_found(monkeypatch):
 @EVERY
 def test_thick_links_are_planned_between_grown_walls(planner):
     length = claimed(planner, 300.0)
-    arm, thicker = ArmSpec(link_length=length, link_radius=15.0), min(80.0, 0.45 * length)
+    arm, thicker = ArmSpec(link_length=length, link_radius=15.0), min(80.0, 0.49 * length)
     result = plan(fig19(), arm, planner=planner)
     assert result.solved, result.reason
     assert validate(result.motion, fig19(), arm).clearance >= 0.0

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from planners.baselines.b_spline import plan_b_spline
+from planners.baselines.backbone import plan_backbone
+from planners.baselines.outer_wall import plan_outer_wall
 from planners.baselines.path_following import plan_path_following
 from planners.problem import Candidate
 from planners.query import Query
@@ -12,5 +15,8 @@ __all__ = ["BASELINES"]
 
 BASELINES: dict[str, Callable[[Query], Candidate]] = {
     "follow": plan_path_following,
+    "outer-wall": plan_outer_wall,
+    "b-spline": plan_b_spline,
+    "backbone": plan_backbone,
 }
 """All baselines by name."""
