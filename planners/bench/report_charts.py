@@ -18,7 +18,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
 
 from hrsnake_env.appearance import COLOURS
 from hrsnake_env.arm import FloatArray
@@ -59,6 +59,9 @@ SUCCESS = LinearSegmentedColormap.from_list(
     "success", ["#d9822b", "#f3d9bf", "#e9edf3", "#a9c6e8", COLOURS["arm"]]
 )
 """From orange (never) to our blue (always): told apart whatever colours one sees."""
+
+TIMES = 10.0 ** np.arange(-6, 6)
+"""Seconds that an axis names."""
 
 LANE = 1.35
 """Factor from one method's mark for "not solved" to the next one's."""
@@ -174,36 +177,51 @@ def _line(method: str, **more: Any) -> Line2D:
     )
 
 
-def time_curves(axes: Axes, rows: Sequence[Row], place: Callable[[Sequence[Row]], float]) -> None:
+def time_curves(
+    every: Sequence[Axes], groups: Sequence[Sequence[Row]], place: Callable[[Sequence[Row]], float]
+) -> None:
     """Draw the median time of every planner over something, and above the limit where it is not solved.
 
     Parameters
     ----------
-    axes : matplotlib Axes
-        With an axis of seconds up.
-    rows : sequence of mapping
-        Of planners.
+    every : sequence of matplotlib Axes
+        With one axis of seconds up.
+    groups : sequence of sequence of mapping
+        The rows of planners in each of the axes.
     place : callable
-        Given the rows of a task, returns where on the axis it is.
+        Given the rows of a task, returns where on the other axis it is.
     """
-    places = {task: place(here) for task, here in grouped(rows, lambda row: row["task"]).items()}
-    top = _top(rows)
-    missed: list[tuple[str, list[float]]] = []
-    for method in reversed(methods_of(rows)):
-        points = {}
-        for task, here in grouped(
-            (row for row in rows if row["method"] == method), lambda row: row["task"]
-        ).items():
-            points[places[task]] = typical_seconds(here)
-        across = sorted(points)
-        up = np.array([points[x] for x in across])
+    rows = [row for group in groups for row in group]
+    methods, top = methods_of(rows), _top(rows)
+    curves = {
+        (method, number): _curve(group, method, place)
+        for number, group in enumerate(groups)
+        for method in methods
+    }
+    missed = [name for name in methods if any(np.isinf(curves[name, n][1]).any() for n in range(len(every)))]
+    for (method, number), (across, up) in curves.items():
         line = _line(method, zorder=3.5 if method in OURS else 3.0)
         line.set_data(across, np.where(np.isfinite(up), up, np.nan))
-        axes.add_line(line)
-        if np.isinf(up).any():
-            missed.append((method, [x for x, y in zip(across, up, strict=True) if math.isinf(y)]))
-    axes.autoscale_view()
-    _mark_missed(axes, missed[::-1], top)
+        every[number].add_line(line)
+        if method in missed:
+            _mark_missed(every[number], method, across[np.isinf(up)], _lane(top, missed.index(method)))
+    for axes in every:
+        axes.autoscale_view()
+    if missed:
+        _show_lanes(every, top, _lane(top, len(missed) - 0.3))
+    every[0].yaxis.set_major_locator(FixedLocator([tick for tick in TIMES if tick <= top]))
+    every[0].yaxis.set_minor_locator(NullLocator())
+
+
+def _curve(
+    rows: Sequence[Row], method: str, place: Callable[[Sequence[Row]], float]
+) -> tuple[FloatArray, FloatArray]:
+    """Return where the tasks are, and the typical time of a method there, infinite if it is not solved."""
+    tasks = grouped(rows, lambda row: row["task"]).values()
+    solved = [(place(task), [row for row in task if row["method"] == method]) for task in tasks]
+    points = sorted((x, typical_seconds(here)) for x, here in solved if here)
+    across, up = np.array(points, dtype=np.float64).reshape(-1, 2).T
+    return across, up
 
 
 def _top(rows: Sequence[Row]) -> float:
@@ -213,26 +231,26 @@ def _top(rows: Sequence[Row]) -> float:
     return max([limit for limit in limits if limit is not None] + times, default=1.0)
 
 
-def _mark_missed(axes: Axes, missed: Sequence[tuple[str, Sequence[float]]], top: float) -> None:
-    """Mark in a lane for each method, above all times, where it did not solve the task."""
-    if not missed:
-        return
-    start = top * LANE
-    for number, (method, places) in enumerate(missed):
-        look = style_of(method)
-        heights = np.full(len(places), start * LANE ** (number + 0.7))
-        axes.plot(places, heights, look.marker, color=look.colour, markersize=3.8, zorder=3)
-    end = start * LANE ** (len(missed) + 0.4)
-    axes.axhspan(start, end, color="#f4f0ea", zorder=0)
-    axes.text(
-        *(0.015, end / LANE**0.3),
-        "not solved",
-        transform=axes.get_yaxis_transform(),
-        fontsize=7,
-        color="#6b5a45",
-        va="top",
+def _lane(top: float, number: float) -> float:
+    """Return how high the marks of a method that did not solve a task are, above all times."""
+    return float(top * LANE ** (1.8 + number))
+
+
+def _mark_missed(axes: Axes, method: str, across: FloatArray, height: float) -> None:
+    look = style_of(method)
+    axes.plot(
+        *(across, np.full(len(across), height), look.marker), color=look.colour, markersize=3.8, zorder=3
     )
-    axes.set_ylim(top=end)
+
+
+def _show_lanes(every: Sequence[Axes], top: float, end: float) -> None:
+    """Set the marks of what is not solved apart from the times."""
+    for axes in every:
+        axes.axhspan(top * LANE, end, color="#f4f0ea", zorder=0)
+    every[0].set_ylim(top=end)
+    height = float(np.sqrt(top * LANE * end))
+    style: dict[str, Any] = {"fontsize": 8, "color": "#6b5a45", "ha": "right", "va": "center"}
+    every[0].text(-0.02, height, "not\nsolved", transform=every[0].get_yaxis_transform(), **style)
 
 
 def show_shares(
@@ -269,5 +287,4 @@ def show_shares(
                 axes.text(*place, text, ha="center", va="center", fontsize=6.5, color=colour)
     for label in [*axes.get_xticklabels(), *axes.get_yticklabels()]:
         if label.get_text() in OURS:
-            label.set_fontweight("bold")
-            label.set_color(COLOURS["arm"])
+            label.set(fontweight="bold", color=COLOURS["arm"])

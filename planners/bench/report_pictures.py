@@ -25,7 +25,7 @@ from planners.bench.report_charts import (
     style_of,
     time_curves,
 )
-from planners.bench.report_learners import Scores, matrix, normalised_runs, shared_tasks, success_runs
+from planners.bench.report_learners import Scores, normalised_runs, shared_tasks, success_runs
 from planners.bench.report_rows import (
     OURS,
     Row,
@@ -46,6 +46,9 @@ MANY = 22
 """More columns than this are put together, by steps of the index."""
 
 STEP = 0.05
+
+Runs = Sequence[Sequence[float]]
+"""Scores of the runs of every task."""
 
 TICKS = (5, 10, 20, 50, 100, 200)
 """Numbers of links that are named on the axis."""
@@ -73,21 +76,18 @@ def draw_index(rows: Sequence[Row], shapes: Sequence[str], out: Path) -> None:
         strip, times = grid[0, column], grid[1, column]
         strip.set_title(shape, fontsize=10, fontweight="bold")
         _success_strip(strip, here, methods)
-        planned = [row for row in here if not is_learner(row)]
         seconds_axis(times)
         plain(times)
-        if planned:
-            time_curves(times, planned, index_of)
         times.set_xlim(0.15, 1.03)
         times.set_xlabel("index I: link over longest rod", fontsize=8)
+    planned = [row for row in rows if not is_learner(row)]
+    time_curves(
+        grid[1, :].tolist(), [[row for row in planned if row["shape"] == shape] for shape in shapes], index_of
+    )
     grid[1, 0].set_ylabel("median time", fontsize=8)
     _success_bar(figure, grid[0, :].tolist())
-    legend(figure, [name for name in methods if any(_planned_by(rows, name))])
+    legend(figure, methods_of(planned))
     save(figure, out)
-
-
-def _planned_by(rows: Sequence[Row], method: str) -> list[bool]:
-    return [not is_learner(row) for row in rows if row["method"] == method]
 
 
 def _success_strip(axes: Axes, rows: Sequence[Row], methods: Sequence[str]) -> None:
@@ -115,7 +115,9 @@ def _shares(
     return np.array(
         [
             [
-                np.mean([succeeded(row) for row in groups.get((name, value), [])] or [np.nan])
+                np.mean([succeeded(row) for row in groups[name, value]])
+                if (name, value) in groups
+                else np.nan
                 for value in columns
             ]
             for name in methods
@@ -150,16 +152,16 @@ def draw_links(rows: Sequence[Row], out: Path) -> None:
     figure = new_figure(4.6)
     every = figure.subplots(1, len(indices), squeeze=False, sharey=True)[0]
     for axes, index in zip(every, indices, strict=True):
-        here = [row for row in rows if round(row["index"], 2) == index]
         seconds_axis(axes)
         axes.set_xscale("log")
         plain(axes)
-        time_curves(axes, here, lambda group: float(links_of(group) or np.nan))
         axes.xaxis.set_major_locator(FixedLocator(TICKS))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0f}"))
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_title(f"I = {index:.2f}", fontsize=10, fontweight="bold")
         axes.set_xlabel("links", fontsize=8)
+    groups = [[row for row in rows if round(row["index"], 2) == index] for index in indices]
+    time_curves(every, groups, lambda group: float(links_of(group) or np.nan))
     every[0].set_ylabel("median time", fontsize=8)
     legend(figure, methods_of(rows))
     save(figure, out)
@@ -177,7 +179,7 @@ def draw_ladder(rows: Sequence[Row], out: Path) -> None:
     figure = new_figure(0.23 * len(order) + 1.6)
     axes = figure.subplots()
     show_shares(axes, shares, methods, labels, numbers=True)
-    axes.xaxis.tick_top()
+    axes.tick_params(axis="x", top=False, labeltop=True, labelbottom=False)
     for label in axes.get_xticklabels():
         label.set(rotation=40, ha="left", rotation_mode="anchor")
     _success_bar(figure, axes, location="bottom", aspect=50, shrink=0.5, pad=0.015, fraction=0.03)
@@ -206,7 +208,7 @@ def draw_profiles(rows: Sequence[Row], out: Path) -> bool:
     for axes, (name, label, scores) in zip(every, panels, strict=True):
         tasks, names = shared_tasks(scores)
         draw = _draw_speeds if name == "planners" else _draw_scores
-        draw(axes, {method: matrix(scores[method], tasks) for method in names})
+        draw(axes, {method: [scores[method][task] for task in tasks] for method in names})
         plain(axes)
         axes.set_ylim(-0.02, 1.02)
         axes.set_xlabel(label, fontsize=8)
@@ -233,20 +235,25 @@ def _planner_speeds(rows: Sequence[Row]) -> Scores:
     }
 
 
-def _draw_speeds(axes: Axes, scores: Mapping[str, FloatArray]) -> None:
+def _draw_speeds(axes: Axes, scores: Mapping[str, Runs]) -> None:
     seconds_axis(axes, "x")
-    speeds = np.concatenate([runs[runs > 0.0] for runs in scores.values()])
-    first, last = (1.0 / speeds.max(), 1.0 / speeds.min()) if len(speeds) else (1e-3, 1.0)
-    times = np.geomspace(0.8 * first, 1.2 * last, 300)
+    speeds = [speed for runs in scores.values() for task in runs for speed in task if speed > 0.0] or [1.0]
+    times = np.geomspace(0.8 / max(speeds), 1.2 / min(speeds), 300)
     for method, runs in scores.items():
-        _profile_line(axes, method, times, performance_profile(runs, 1.0 / times))
+        _profile_line(axes, method, times, _profile(runs, 1.0 / times))
 
 
-def _draw_scores(axes: Axes, scores: Mapping[str, FloatArray]) -> None:
-    highest = max(1.0, *(float(runs.max()) for runs in scores.values()))
+def _draw_scores(axes: Axes, scores: Mapping[str, Runs]) -> None:
+    highest = max(1.0, *(max(task) for runs in scores.values() for task in runs))
     taus = np.linspace(0.0, highest, 301)
     for method, runs in scores.items():
-        _profile_line(axes, method, taus, performance_profile(runs, taus))
+        _profile_line(axes, method, taus, _profile(runs, taus))
+
+
+def _profile(runs: Runs, thresholds: FloatArray) -> FloatArray:
+    """Return the mean of the profiles of all tasks, of which some may have more runs than others."""
+    profiles = [performance_profile([[score] for score in task], thresholds) for task in runs]
+    return np.asarray(np.mean(profiles, axis=0), dtype=np.float64)
 
 
 def _profile_line(axes: Axes, method: str, across: FloatArray, shares: FloatArray) -> None:
@@ -257,11 +264,11 @@ def _profile_line(axes: Axes, method: str, across: FloatArray, shares: FloatArra
         linewidth=look.width,
         marker=look.marker,
         markersize=4,
-        markevery=(hash_of(method), 40),
+        markevery=(first_mark(method), 40),
         zorder=3.5 if method in OURS else 3.0,
     )
 
 
-def hash_of(method: str) -> int:
+def first_mark(method: str) -> int:
     """Return where the first marker of a line is, so that those of lines that run together are apart."""
     return sum(map(ord, method)) % 40

@@ -155,9 +155,9 @@ def ladder_order(rows: Iterable[Row]) -> list[str]:
     first = {task: group[0] for task, group in grouped(rows, lambda row: row["task"]).items()}
     last = len(places)
 
-    def height(task: str) -> tuple[int, float, str]:
+    def height(task: str) -> tuple[int, int, str]:
         place = min(places.get(task, last), places.get(first[task]["maze"], last))
-        return place, first[task]["index"], task
+        return place, first[task]["n_links"] or 0, task
 
     return sorted(first, key=height)
 
