@@ -11,8 +11,8 @@ from hrsnake_env.files import replacing
 from planners.bench.report_learners import learner_table
 from planners.bench.report_page import Picture, Section, Table, html_page, markdown_page
 from planners.bench.report_pictures import draw_index, draw_ladder, draw_links, draw_profiles
-from planners.bench.report_rows import Row, is_learner, of_study, read_rows
-from planners.bench.report_tables import below_table, ladder_tables, run_table, tightest_table, time_table
+from planners.bench.report_rows import Row, is_learner, machines, of_study, read_rows
+from planners.bench.report_tables import below_table, ladder_tables, runs_in_words, tightest_table, time_table
 
 __all__ = ["write_report"]
 
@@ -22,10 +22,11 @@ BENDS = ("bend", "u-turn", "s-bend")
 SPACES = ("random", "clutter")
 
 INTERVALS = (
-    "Success intervals are those of the posterior with a uniform prior. They count all runs of a cell as "
-    "independent: planners that draw no random numbers repeat themselves over seeds, and episodes of one "
-    "trained policy resemble each other, so for these they are too narrow. Times are wall-clock and include "
-    "the exact check; of planners only successes are timed."
+    "Success means that the goal was reached in the simulator, or, where nothing was simulated, that the "
+    "exact checker passed the motion. Its intervals are those of the posterior with a uniform prior, and a "
+    "single run has none. They count the episodes of one trained policy as independent, which makes them too "
+    "narrow; intervals of interquartile means are over trainings. Times are wall-clock and include the "
+    "exact check; of planners only successes are timed."
 )
 
 
@@ -57,7 +58,7 @@ def write_report(folders: Sequence[Path], out: Path) -> list[Path]:
     if not os.access(out, os.W_OK):
         raise InputError(f"Expected a folder that can be written, but '{out}' cannot.")
     sections = [
-        _ran(rows),
+        _ran(rows, machines(folders)),
         *(section(of_study(rows, study), out) for study, section in STUDIES.items() if of_study(rows, study)),
     ]
     pictures = [block.name for part in sections for block in part.blocks if isinstance(block, Picture)]
@@ -68,16 +69,18 @@ def write_report(folders: Sequence[Path], out: Path) -> list[Path]:
     return [out / name for name in ("report.md", "report.html", *pictures)]
 
 
-def _ran(rows: Sequence[Row]) -> Section:
+def _ran(rows: Sequence[Row], where: Sequence[str]) -> Section:
     """Say what was run, and what was not."""
     missing = [study for study in STUDIES if not of_study(rows, study)]
     unknown = sorted({row["study"] for row in rows} - set(STUDIES))
-    text = [INTERVALS]
+    text = [INTERVALS, *runs_in_words(rows)]
+    if where:
+        text.append(f"Measured on {'; '.join(where)}.")
     if missing:
         text.append(f"Not measured, and left out: {', '.join(missing)}.")
     if unknown:
         text.append(f"Measured, but not known to this report: {', '.join(unknown)}.")
-    return Section(title="What was run", text=text, blocks=[run_table(rows)])
+    return Section(title="What was run", text=text)
 
 
 def _ladder(rows: Sequence[Row], out: Path) -> Section:
@@ -133,9 +136,10 @@ def _links(rows: Sequence[Row], out: Path) -> Section:
 
 def _tightest(rows: Sequence[Row], out: Path) -> Section:
     text = (
-        "The largest index at which the exact checker finds no penetration anywhere on the motion, bold the "
-        "largest of each maze, and the largest at which a motion is valid (up to 0.001 link lengths between "
-        "poses). The longest rod is that of the maze, so an index of 1 is what nothing passes."
+        "The largest index at which a motion is valid (no penetration at any pose, at most 0.001 link "
+        "lengths anywhere between poses), bold the largest of each maze; and the largest at which the exact "
+        "checker finds no penetration between poses either. The index is the link's length over the longest "
+        "rod that passes the maze: nothing passes above 1."
     )
     return Section(title="The tightest links", text=[text, _missing(rows)], blocks=[tightest_table(rows)])
 

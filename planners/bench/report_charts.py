@@ -204,11 +204,16 @@ def time_curves(
         line.set_data(across, np.where(np.isfinite(up), up, np.nan))
         every[number].add_line(line)
         if method in missed:
-            _mark_missed(every[number], method, across[np.isinf(up)], _lane(top, missed.index(method)))
+            _mark_missed(
+                every[number],
+                method,
+                across[np.isinf(up)],
+                _lane(top, len(missed) - 1 - missed.index(method)),
+            )
     for axes in every:
         axes.autoscale_view()
     if missed:
-        _show_lanes(every, top, _lane(top, len(missed) - 0.3))
+        _show_lanes(every, top, _lane(top, len(missed)))
     every[0].yaxis.set_major_locator(FixedLocator([tick for tick in TIMES if tick <= top]))
     every[0].yaxis.set_minor_locator(NullLocator())
 
@@ -254,7 +259,13 @@ def _show_lanes(every: Sequence[Axes], top: float, end: float) -> None:
 
 
 def show_shares(
-    axes: Axes, shares: FloatArray, columns: Sequence[str], methods: Sequence[str], *, numbers: bool
+    axes: Axes,
+    shares: FloatArray,
+    columns: Sequence[str],
+    methods: Sequence[str],
+    *,
+    numbers: bool = False,
+    on_top: bool = False,
 ) -> None:
     """Draw a table of shares as colours, white where nothing was measured.
 
@@ -268,6 +279,8 @@ def show_shares(
         What stands below and at the left.
     numbers : bool
         Whether to write percents into the cells.
+    on_top : bool
+        Whether the names of the columns stand above.
     """
     axes.pcolormesh(
         np.ma.masked_invalid(shares), cmap=SUCCESS, vmin=0.0, vmax=1.0, edgecolors="white", linewidth=0.8
@@ -276,7 +289,7 @@ def show_shares(
     axes.set_ylim(shares.shape[0], 0)
     axes.set_xticks(np.arange(len(columns)) + 0.5, columns)
     axes.set_yticks(np.arange(len(methods)) + 0.5, methods)
-    axes.tick_params(length=0, labelsize=8)
+    axes.tick_params(length=0, labelsize=8, top=on_top, labeltop=on_top, labelbottom=not on_top)
     axes.spines[:].set_visible(False)
     if numbers:
         for (row, column), share in np.ndenumerate(shares):

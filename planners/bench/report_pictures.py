@@ -13,6 +13,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
+from hrsnake_env.appearance import COLOURS
 from hrsnake_env.arm import FloatArray
 from planners.bench.report_charts import (
     SUCCESS,
@@ -68,7 +69,8 @@ def draw_index(rows: Sequence[Row], shapes: Sequence[str], out: Path) -> None:
     """
     rows = [row for row in rows if row["shape"] in shapes and row["actions"] != "sampled"]
     methods = methods_of(rows)
-    heights = (0.17 * len(methods) + 0.35, 2.9)
+    n_planners = _n_planners(rows, methods)
+    heights = (0.17 * len(methods) + 0.35, 3.3)
     figure = new_figure(sum(heights) + 1.25)
     grid = figure.subplots(2, len(shapes), squeeze=False, sharey="row", height_ratios=heights)
     for column, shape in enumerate(shapes):
@@ -76,6 +78,8 @@ def draw_index(rows: Sequence[Row], shapes: Sequence[str], out: Path) -> None:
         strip, times = grid[0, column], grid[1, column]
         strip.set_title(shape, fontsize=10, fontweight="bold")
         _success_strip(strip, here, methods)
+        if 0 < n_planners < len(methods):
+            strip.axhline(n_planners, color=COLOURS["edge"], linewidth=1.2)
         seconds_axis(times)
         plain(times)
         times.set_xlim(0.15, 1.03)
@@ -90,6 +94,12 @@ def draw_index(rows: Sequence[Row], shapes: Sequence[str], out: Path) -> None:
     save(figure, out)
 
 
+def _n_planners(rows: Sequence[Row], methods: Sequence[str]) -> int:
+    """Return how many of the methods, the first ones, are planners."""
+    planning = {row["method"] for row in rows if not is_learner(row)}
+    return sum(method in planning for method in methods)
+
+
 def _success_strip(axes: Axes, rows: Sequence[Row], methods: Sequence[str]) -> None:
     """Draw success over the index, a line for each method."""
     exact = sorted({round(row["index"], 2) for row in rows})
@@ -102,7 +112,7 @@ def _success_strip(axes: Axes, rows: Sequence[Row], methods: Sequence[str]) -> N
     columns = sorted({column(row) for row in rows})
     shares = _shares(rows, methods, columns, column)
     names = [f"{value:.2g}".lstrip("0") for value in columns]
-    show_shares(axes, shares, names, methods, numbers=False)
+    show_shares(axes, shares, names, methods)
     axes.set_xticks(np.arange(0, len(columns), 3) + 0.5, names[::3])
     axes.tick_params(labelsize=7.5)
 
@@ -178,8 +188,10 @@ def draw_ladder(rows: Sequence[Row], out: Path) -> None:
     shares = _shares(rows, methods, order, lambda row: row["task"]).T
     figure = new_figure(0.23 * len(order) + 1.6)
     axes = figure.subplots()
-    show_shares(axes, shares, methods, labels, numbers=True)
-    axes.tick_params(axis="x", top=False, labeltop=True, labelbottom=False)
+    show_shares(axes, shares, methods, labels, numbers=True, on_top=True)
+    planners = _n_planners(rows, methods)
+    if 0 < planners < len(methods):
+        axes.axvline(planners, color=COLOURS["edge"], linewidth=1.2)
     for label in axes.get_xticklabels():
         label.set(rotation=40, ha="left", rotation_mode="anchor")
     _success_bar(figure, axes, location="bottom", aspect=50, shrink=0.5, pad=0.015, fraction=0.03)

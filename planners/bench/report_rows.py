@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -20,6 +21,7 @@ __all__ = [
     "is_learner",
     "ladder_order",
     "links_of",
+    "machines",
     "methods_of",
     "of_study",
     "read_rows",
@@ -31,14 +33,23 @@ __all__ = [
 ROWS = "rows.parquet"
 """What a study writes into its folder."""
 
+MANIFEST = "manifest.json"
+"""What it says beside about its runs and their machines."""
+
 COLUMNS = {
     **dict.fromkeys(("study", "method", "task", "shape", "maze"), "string"),
-    **{"link_length": "double", "n_links": "int64", "longest_rod": "double", "index": "double"},
-    **{"seed": "int64", "episode": "int64", "actions": "string", "budget": "double", "budget_unit": "string"},
+    **{"link_length": "float64", "n_links": "int64", "longest_rod": "float64", "index": "float64"},
+    **{
+        "seed": "int64",
+        "episode": "int64",
+        "actions": "string",
+        "budget": "float64",
+        "budget_unit": "string",
+    },
     **{"status": "string", "reason": "string", "solved": "bool", "success": "bool", "clean": "bool"},
-    **dict.fromkeys(("seconds", "cpu_seconds", "check_seconds"), "double"),
-    **{"train_steps": "int64", "steps": "int64", "return": "double", "progress": "double"},
-    **{"worst_depth": "double", "collisions": "int64", "pinches": "int64"},
+    **dict.fromkeys(("seconds", "cpu_seconds", "check_seconds"), "float64"),
+    **{"train_steps": "int64", "steps": "int64", "return": "float64", "progress": "float64"},
+    **{"worst_depth": "float64", "collisions": "int64", "pinches": "int64"},
 }
 """Types of the columns, as Arrow names them."""
 
@@ -125,6 +136,20 @@ def _read(path: Path) -> list[Row]:
     return rows
 
 
+def machines(folders: Sequence[Path]) -> list[str]:
+    """Say on which machines studies were run, as far as their manifests tell it."""
+    found: dict[str, None] = {}
+    for folder in folders:
+        try:
+            for run in json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["runs"]:
+                machine = run["machine"]
+                named = f"{machine['cores']} cores of {machine['processor']}"
+                found[f"{named}, Python {machine['python']}, {run['workers']} at a time"] = None
+        except (OSError, ValueError, KeyError, TypeError):
+            continue  # it only adds to what the rows tell
+    return list(found)
+
+
 def grouped(rows: Iterable[Row], key: Callable[[Row], Key]) -> dict[Key, list[Row]]:
     """Sort rows into groups, in the order in which these turn up."""
     groups: dict[Key, list[Row]] = {}
@@ -195,6 +220,6 @@ def index_of(rows: Sequence[Row]) -> float:
 
 def links_of(rows: Sequence[Row]) -> int | None:
     """Return the median number of links of the runs that succeeded, or of all if none did."""
-    counts = [row["n_links"] for row in rows if row["n_links"] is not None]
-    solved = [row["n_links"] for row in rows if row["n_links"] is not None and succeeded(row)]
+    counts = [row["n_links"] for row in rows if row["n_links"]]
+    solved = [row["n_links"] for row in rows if row["n_links"] and succeeded(row)]
     return round(float(np.median(solved or counts))) if counts else None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -23,7 +23,15 @@ from planners.bench.report_rows import (
 )
 from planners.bench.statistics import success_share
 
-__all__ = ["below_table", "duration", "ladder_tables", "percent", "run_table", "tightest_table", "time_table"]
+__all__ = [
+    "below_table",
+    "duration",
+    "ladder_tables",
+    "percent",
+    "runs_in_words",
+    "tightest_table",
+    "time_table",
+]
 
 FOLLOW = "follow"
 """Follow-the-leader: its result stands beside every rung."""
@@ -51,28 +59,32 @@ def percent(share: float) -> str:
     return f"{text} %"
 
 
-def run_table(rows: Sequence[Row]) -> Table:
-    """Say what was run: per study and method its tasks, seeds, episodes and budget, and what went wrong."""
-    groups = grouped(rows, lambda row: (row["study"], row["method"]))
-    lines = []
-    for study in dict.fromkeys(row["study"] for row in rows):
-        for method in methods_of(row for row in rows if row["study"] == study):
-            every = groups[study, method]
-            budgets = {
-                f"{row['budget']:g} {row['budget_unit']}" for row in every if row["budget"] is not None
-            }
-            errors = [row for row in every if str(row["status"]).startswith("error")]
-            counts = (len({row[name] for row in every}) for name in ("task", "seed"))
-            lines.append(
-                (
-                    f"{study}: {method}",
-                    *map(str, counts),
-                    str(len(every)),
-                    ", ".join(sorted(budgets)),
-                    f"{len(errors)} ({errors[0]['status']})" if errors else "0",
-                )
+def runs_in_words(rows: Sequence[Row]) -> Iterator[str]:
+    """Say what was run in each study: methods with their tasks, seeds, rows and budget, and what went wrong."""
+    for study, here in grouped(rows, lambda row: row["study"]).items():
+        groups = grouped(here, lambda row: row["method"])
+        alike: dict[str, list[str]] = {}
+        for method in methods_of(here):
+            alike.setdefault(_amount(groups[method]), []).append(method)
+        yield (
+            f"**{study}**: "
+            + "; ".join(f"{', '.join(names)} ({what})" for what, names in alike.items())
+            + "."
+        )
+        errors = [row for row in here if str(row["status"]).startswith("error")]
+        if errors:
+            first = errors[0]
+            yield (
+                f"**{len(errors)} rows of {study} are errors** and count as failures, the first of "
+                f"{first['method']} on {first['task']}: {first['status'].removeprefix('error: ')}."
             )
-    return Table(head=("study: method", "tasks", "seeds", "rows", "budget", "errors"), rows=lines)
+
+
+def _amount(rows: Sequence[Row]) -> str:
+    tasks, seeds = (len({row[name] for row in rows}) for name in ("task", "seed"))
+    budgets = sorted({f"{row['budget']:g} {row['budget_unit']}" for row in rows if row["budget"]})
+    amounts = [f"{tasks} task{'s' * (tasks != 1)}", f"{seeds} seed{'s' * (seeds != 1)}", f"{len(rows)} rows"]
+    return ", ".join(amounts + budgets)
 
 
 def ladder_tables(rows: Sequence[Row]) -> list[Table]:
@@ -127,8 +139,10 @@ def _cell(rows: Sequence[Row]) -> str:
     """Write success with its interval, and the time: of a success for planners, of training for learners."""
     if not rows:
         return "-"
-    share = success_share(sum(map(succeeded, rows)), len(rows))
-    text = f"{percent(share.value)} ({100 * share.low:.0f} to {100 * share.high:.0f})"
+    text = "solved" if succeeded(rows[0]) else "fails"
+    if len(rows) > 1:
+        share = success_share(sum(map(succeeded, rows)), len(rows))
+        text = f"{percent(share.value)} ({100 * share.low:.0f} to {100 * share.high:.0f})"
     timed = [row for row in rows if succeeded(row) or is_learner(row)]
     times = [row["seconds"] for row in timed if row["seconds"] is not None]
     return f"{text}, {duration(float(np.median(times)))}" if times and max(times) > 0.0 else text
@@ -172,36 +186,32 @@ def tightest_table(rows: Sequence[Row]) -> Table:
     lines = []
     for maze, here in grouped(rows, lambda row: row["maze"]).items():
         groups = grouped(here, lambda row: row["method"])
-        best = max((_largest(group) for group in groups.values()), default=0.0)
+        best = max(_largest(group, succeeded) for group in groups.values())
         for method in methods_of(here):
             lines.append((f"{maze}: {method}", *_tightest_cells(groups[method], best)))
-    head = (
-        "maze: planner",
-        "largest I without penetration",
-        "links",
-        "time there",
-        "largest I that is valid",
-    )
+    head = ("maze: planner", "largest I that is valid", "without penetration", "links", "time there")
     return Table(head=(*head, "shorter lengths that fail", "longest rod"), rows=lines)
 
 
-def _largest(rows: Sequence[Row]) -> float:
-    """Return the largest index without any penetration on the whole motion; 0 if there is none."""
-    return max((row["index"] for row in rows if _is_free(row)), default=0.0)
+def _largest(rows: Sequence[Row], passes: Callable[[Row], bool]) -> float:
+    """Return the largest index of the rows that pass; 0 if there is none."""
+    return max((float(row["index"]) for row in rows if passes(row)), default=0.0)
 
 
 def _is_free(row: Row) -> bool:
+    """Tell whether a motion was found that does not penetrate the walls anywhere."""
     return succeeded(row) and row["worst_depth"] is not None and row["worst_depth"] <= DEEPEST
 
 
 def _tightest_cells(rows: Sequence[Row], best: float) -> Iterator[str]:
     """Write what a planner reaches in one maze."""
-    free, valid = _largest(rows), max((row["index"] for row in rows if succeeded(row)), default=0.0)
-    there = [row for row in rows if row["index"] == free and succeeded(row)]
-    yield "none" if not free else f"**{free:.3f}**" if free == best else f"{free:.3f}"
+    valid, free = _largest(rows, succeeded), _largest(rows, _is_free)
+    measured = any(row["worst_depth"] is not None for row in rows if succeeded(row))
+    there = [row for row in rows if row["index"] == valid and succeeded(row)]
+    yield "none" if not valid else f"**{valid:.3f}**" if valid == best else f"{valid:.3f}"
+    yield f"{free:.3f}" if free else "none" if measured or not valid else "not measured"
     yield str(links_of(there) or "-") if there else "-"
     yield duration(typical_seconds(there)) if there else "-"
-    yield f"{valid:.3f}" if valid else "none"
     shorter = [group for index, group in grouped(rows, lambda row: row["index"]).items() if index < valid]
     yield f"{sum(not all(map(succeeded, group)) for group in shorter)} of {len(shorter)}" if valid else "-"
     yield f"{rows[0]['longest_rod']:.5g}" if rows[0]["longest_rod"] is not None else "-"
