@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
 from planners.bench.report_learners import learner_table
 from planners.bench.report_page import Picture, Section, Table, html_page, markdown_page
@@ -48,15 +46,10 @@ def write_report(folders: Sequence[Path], out: Path) -> list[Path]:
     Raises
     ------
     InputError
-        If there are no rows, they cannot be read, or the folder cannot be written.
+        If there are no rows, or they cannot be read.
     """
     rows = read_rows(folders)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"Expected a folder that can be written, got '{out}': {error.strerror}.") from None
-    if not os.access(out, os.W_OK):
-        raise InputError(f"Expected a folder that can be written, but '{out}' cannot.")
+    out.mkdir(parents=True, exist_ok=True)
     sections = [
         _ran(rows, machines(folders)),
         *(section(of_study(rows, study), out) for study, section in STUDIES.items() if of_study(rows, study)),

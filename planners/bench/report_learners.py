@@ -8,7 +8,7 @@ import numpy as np
 
 from hrsnake_env.arm import FloatArray
 from planners.bench.report_page import Table
-from planners.bench.report_rows import OURS, Row, grouped, is_learner, methods_of, succeeded
+from planners.bench.report_rows import OURS, RANDOM, Row, grouped, is_learner, methods_of, succeeded
 from planners.bench.report_tables import duration
 from planners.bench.statistics import (
     Estimate,
@@ -23,8 +23,6 @@ __all__ = ["Scores", "learner_table", "matrix", "normalised_runs", "shared_tasks
 
 BASELINE = "ppo"
 """With whose runs those of the other learners are compared."""
-
-RANDOM = "random"
 
 SEED = 0
 """Of the bootstrap: the same rows give the same report."""

@@ -33,6 +33,7 @@ from planners.bench.report_rows import (
     grouped,
     index_of,
     is_learner,
+    is_shown,
     ladder_order,
     links_of,
     methods_of,
@@ -67,7 +68,7 @@ def draw_index(rows: Sequence[Row], shapes: Sequence[str], out: Path) -> None:
     out : Path
         The picture.
     """
-    rows = [row for row in rows if row["shape"] in shapes and row["actions"] != "sampled"]
+    rows = [row for row in rows if row["shape"] in shapes and is_shown(row)]
     methods = methods_of(rows)
     n_planners = _n_planners(rows, methods)
     heights = (0.17 * len(methods) + 0.35, 3.3)
@@ -179,7 +180,7 @@ def draw_links(rows: Sequence[Row], out: Path) -> None:
 
 def draw_ladder(rows: Sequence[Row], out: Path) -> None:
     """Draw the success of all methods on all rungs, of learners with deterministic actions, as colours."""
-    rows = [row for row in rows if row["actions"] != "sampled"]
+    rows = [row for row in rows if is_shown(row)]
     methods, order = methods_of(rows), ladder_order(rows)
     tasks = grouped(rows, lambda row: row["task"])
     named = [rung(task, tasks[task]) for task in order]

@@ -16,9 +16,11 @@ from hrsnake_env.ladder import LADDER
 __all__ = [
     "METHODS",
     "OURS",
+    "RANDOM",
     "grouped",
     "index_of",
     "is_learner",
+    "is_shown",
     "ladder_order",
     "links_of",
     "machines",
@@ -69,6 +71,9 @@ METHODS = (
     *("ppo", "ppo-planned", "ppo-residual", "sac", "tqc-her", "clone", "dagger", "random"),
 )
 """The order in which methods are shown; others come after them."""
+
+RANDOM = "random"
+"""The policy that draws its actions evenly: the zero of scores."""
 
 OUT_OF_TIME = "out of time"
 
@@ -166,6 +171,11 @@ def of_study(rows: Iterable[Row], study: str) -> list[Row]:
 def is_learner(row: Row) -> bool:
     """Tell whether a policy ran, not a planner."""
     return bool(row["actions"] != "planned")
+
+
+def is_shown(row: Row) -> bool:
+    """Tell whether a row is in charts, which show learners with deterministic actions alone."""
+    return bool(row["actions"] != "sampled" or row["method"] == RANDOM)
 
 
 def methods_of(rows: Iterable[Row]) -> list[str]:

@@ -60,7 +60,7 @@ def percent(share: float) -> str:
 
 
 def runs_in_words(rows: Sequence[Row]) -> Iterator[str]:
-    """Say what was run in each study: methods with their tasks, seeds, rows and budget, and what went wrong."""
+    """Say what was run in each study: methods, tasks, seeds, rows, budget, and what went wrong."""
     for study, here in grouped(rows, lambda row: row["study"]).items():
         groups = grouped(here, lambda row: row["method"])
         alike: dict[str, list[str]] = {}
