@@ -9,7 +9,7 @@ from hrsnake_env.files import replacing
 from planners.bench.report_learners import learner_table
 from planners.bench.report_page import Picture, Section, Table, html_page, markdown_page
 from planners.bench.report_pictures import draw_index, draw_ladder, draw_links, draw_profiles
-from planners.bench.report_rows import Row, is_learner, machines, of_study, read_rows
+from planners.bench.report_rows import Row, is_learner, ladder_order, machines, of_study, read_rows
 from planners.bench.report_tables import below_table, ladder_tables, runs_in_words, tightest_table, time_table
 
 __all__ = ["write_report"]
@@ -87,7 +87,7 @@ def _ladder(rows: Sequence[Row], out: Path) -> Section:
         below_table(rows),
         *ladder_tables(rows),
     ]
-    if times := time_table(rows):
+    if times := time_table(rows, ladder_order(rows)):
         blocks.append(times)
     return Section(
         title="The ladder", text=[_missing(rows)], blocks=[*blocks, *_learners(rows, out, "ladder")]
@@ -161,7 +161,7 @@ def _missing(rows: Sequence[Row]) -> str:
     for row in rows:
         by_method.setdefault(row["method"], set()).add(row["task"])
     part = [f"{name} on {len(here)}" for name, here in sorted(by_method.items()) if len(here) < len(tasks)]
-    return f"{len(tasks)} tasks" + (
+    return f"{len(tasks)} task{'s' * (len(tasks) != 1)}" + (
         f"; not all methods on all: {', '.join(part)}." if part else ", all methods on all."
     )
 

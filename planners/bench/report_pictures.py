@@ -276,6 +276,7 @@ def _profile_line(axes: Axes, method: str, across: FloatArray, shares: FloatArra
         color=look.colour,
         linewidth=look.width,
         marker=look.marker,
+        drawstyle="steps-post",
         markersize=4,
         markevery=(first_mark(method), 40),
         zorder=3.5 if method in OURS else 3.0,

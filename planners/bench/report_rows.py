@@ -203,14 +203,11 @@ def succeeded(row: Row) -> bool:
 
 
 def typical_seconds(rows: Sequence[Row]) -> float:
-    """Return the median time; infinite if that run did not succeed.
-
-    Of an even number the slower one of the two in the middle counts, as half of an infinite time is none.
-    """
+    """Return the median time; runs that did not succeed take infinitely long."""
     times = sorted(
         row["seconds"] if succeeded(row) and row["seconds"] is not None else math.inf for row in rows
     )
-    return float(times[len(times) // 2])
+    return float(0.5 * (times[(len(times) - 1) // 2] + times[len(times) // 2]))
 
 
 def time_limit(rows: Sequence[Row]) -> float | None:

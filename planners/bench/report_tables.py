@@ -10,6 +10,7 @@ import numpy as np
 from planners.bench.report_page import Table
 from planners.bench.report_rows import (
     OURS,
+    RANDOM,
     Row,
     grouped,
     index_of,
@@ -143,7 +144,7 @@ def _cell(rows: Sequence[Row]) -> str:
     if len(rows) > 1:
         share = success_share(sum(map(succeeded, rows)), len(rows))
         text = f"{percent(share.value)} ({100 * share.low:.0f} to {100 * share.high:.0f})"
-    timed = [row for row in rows if succeeded(row) or is_learner(row)]
+    timed = [row for row in rows if row["method"] != RANDOM and (succeeded(row) or is_learner(row))]
     times = [row["seconds"] for row in timed if row["seconds"] is not None]
     return f"{text}, {duration(float(np.median(times)))}" if times and max(times) > 0.0 else text
 
@@ -217,10 +218,10 @@ def _tightest_cells(rows: Sequence[Row], best: float) -> Iterator[str]:
     yield f"{rows[0]['longest_rod']:.5g}" if rows[0]["longest_rod"] is not None else "-"
 
 
-def time_table(rows: Sequence[Row]) -> Table | None:
+def time_table(rows: Sequence[Row], order: Sequence[str] = ()) -> Table | None:
     """Write the times of the other planners, and how many times ours they are, task by task.
 
-    None if ours or others were not measured.
+    In the given order of tasks, or by shape, index and links. None if ours or others were not measured.
     """
     planned = [row for row in rows if not is_learner(row)]
     names = methods_of(planned)
@@ -229,19 +230,23 @@ def time_table(rows: Sequence[Row]) -> Table | None:
     if reference is None or not others:
         return None
     lines = []
-    for task, here in sorted(grouped(planned, lambda row: row["task"]).items(), key=_by_index):
+    tasks = grouped(planned, lambda row: row["task"])
+    for task in [name for name in order if name in tasks] or sorted(
+        tasks, key=lambda name: _place(tasks[name])
+    ):
+        here = tasks[task]
         groups = grouped(here, lambda row: row["method"])
         ours = typical_seconds(groups[reference]) if reference in groups else math.inf
         own = "-" if reference not in groups else duration(ours) if ours < math.inf else "not solved"
         cells = (time_cell(groups.get(name, []), ours) for name in others)
         lines.append((task, *rung(task, here)[1:3], own, *cells))
     shown = [f"**{name}**" if name in OURS else name for name in others]
-    title = f"Median time, and how many times that of `{reference}` it is"
+    title = f"Median time, and how many times that of `{reference}` it is; why, if half of the runs fail"
     return Table(head=("task", "I", "links", f"**{reference}**", *shown), rows=lines, title=title)
 
 
-def _by_index(item: tuple[str, Sequence[Row]]) -> tuple[str, float, int]:
-    rows = item[1]
+def _place(rows: Sequence[Row]) -> tuple[str, float, int]:
+    """Return what tasks are sorted by."""
     return rows[0]["shape"], round(index_of(rows), 3), links_of(rows) or 0
 
 
