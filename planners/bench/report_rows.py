@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import math
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
@@ -57,7 +58,7 @@ COLUMNS = {
 
 NEVER_NULL = ("study", "method", "task", "shape", "maze", "index", "seed", "episode", "actions", "solved")
 
-KEY = ("study", "method", "task", "seed", "episode", "actions", "budget", "link_length")
+KEY = ("study", "method", "task", "seed", "actions", "episode")
 """No two rows are alike in all of these."""
 
 OURS = ("auto", "track", "sweep")
@@ -117,8 +118,7 @@ def read_rows(folders: Sequence[Path]) -> list[Row]:
 def _read(path: Path) -> list[Row]:
     """Read one file."""
     try:
-        import pyarrow
-        from pyarrow import parquet
+        pyarrow, parquet = (importlib.import_module(name) for name in ("pyarrow", "pyarrow.parquet"))
     except ImportError:
         raise InputError(
             "Expected pyarrow to be installed, to read results: pip install 'hrsnake[bench]'."
