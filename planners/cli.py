@@ -413,6 +413,20 @@ def bench_env_command(
         raise typer.Exit(INTERRUPTED)
 
 
+@bench_app.command("report")
+def bench_report_command(
+    folders: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Of studies, with their rows.")],
+    out: Annotated[Path, typer.Option("--out", help="Folder for the report; made if missing.")],
+    as_json: JsonOption = False,
+) -> None:
+    """Write tables, pictures and one HTML page of the studies in some folders."""
+    from planners.bench.report import write_report
+
+    _check_folder(out)
+    written = [str(path) for path in write_report(folders, out)]
+    _print(as_json, {"written": written}, lambda: print("\n".join(written)))
+
+
 def main() -> None:
     """Run the command line: one sentence on stderr and exit code 2 for bad input, no traceback."""
     try:
