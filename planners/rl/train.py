@@ -1,0 +1,311 @@
+"""Train a policy in an environment: seeded, watched, and stopped and resumed without loss."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.util
+import json
+import os
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hrsnake_env.arguments import check_at_least, is_number
+from hrsnake_env.errors import InputError
+from hrsnake_env.files import replacing
+from planners.rl.checkpoints import read_model, read_progress, write_checkpoint
+from planners.rl.environments import make_env
+from planners.rl.network import NetworkPolicy, Origin
+from planners.rl.settings import METHODS, Settings, load_settings
+from planners.rl.watch import Progress, Watch, stop_on_interrupt, training_bar
+
+__all__ = ["METHODS", "TrainingRun", "train"]
+
+CHECKPOINT_STEPS = {"ppo": 50_000, "sac": 10_000, "tqc": 10_000}
+"""From one checkpoint to the next: about as long for each, as steps of off-policy learners take longer."""
+
+CHECKPOINT, POLICY, RUN = "checkpoint.zip", "policy.npz", "run.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainingRun:
+    """Hold what came of a training.
+
+    Parameters
+    ----------
+    method, env_id, seed
+        What was trained.
+    steps, episodes : int
+        Of all environments together, over all resumed runs.
+    success : float or None
+        Share of the last 100 episodes that began at the base, with actions sampled as in training.
+    stopped : {"learnt", "steps", "interrupted"}
+        Why it ended.
+    cpu_seconds, seconds : float
+        Of the process, and on the clock; over all resumed runs.
+    curve : tuple of (steps, cpu_seconds, success)
+        The learning curve.
+    policy, checkpoint : Path
+        Files in the folder.
+    """
+
+    method: str
+    env_id: str
+    seed: int
+    steps: int
+    episodes: int
+    success: float | None
+    stopped: str
+    cpu_seconds: float
+    seconds: float
+    curve: tuple[tuple[float, ...], ...]
+    policy: Path
+    checkpoint: Path
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON."""
+        return {**asdict(self), "policy": str(self.policy), "checkpoint": str(self.checkpoint)}
+
+
+def train(
+    method: str,
+    env_id: str,
+    *,
+    seed: int = 0,
+    steps: int | None = None,
+    folder: str | os.PathLike[str],
+    resume: bool = False,
+    env_kwargs: dict[str, Any] | None = None,
+    stop_at: float = 0.98,
+    quiet: bool = False,
+    settings: Settings | None = None,
+) -> TrainingRun:
+    """Train until the task is learnt, or for a number of steps.
+
+    The task is learnt when `stop_at` of the last 100 episodes that began at the base have succeeded; where
+    most begin on a planned motion, 20 are enough. Ctrl-C stops at the next step and keeps what is there. A
+    run that is resumed goes on from the last checkpoint with episodes that begin anew, and so not to the last
+    bit as if it had never stopped; the same checkpoint always goes on in the same way.
+
+    Parameters
+    ----------
+    method : str
+        One of `METHODS`.
+    env_id : str
+        A registered id.
+    seed : int
+        The same seed gives the same policy, on the same machine with the same versions.
+    steps : int, optional
+        Of all environments together, rounded up to whole rollouts; by default the settings' own.
+    folder : path
+        For the checkpoint, the policy, the record of the run, and logs for TensorBoard if it is installed.
+    resume : bool
+        Go on from the checkpoint in the folder, if there is one.
+    env_kwargs : dict, optional
+        For the environment, after the settings' own.
+    stop_at : float
+        Share of successful episodes, over 0; over 1 it is never reached.
+    quiet : bool
+        Whether to show no bar.
+    settings : Settings, optional
+        Others than `load_settings` has.
+
+    Raises
+    ------
+    InputError
+        If stable-baselines3 is not installed, an argument is unknown or out of its range, the folder holds
+        another run, or has one that shall not be resumed.
+    """
+    check_at_least("seed", seed, 0, whole=True)
+    if not (is_number(stop_at) and stop_at > 0.0):
+        raise InputError(f"Expected a positive stop_at, got {stop_at!r}.")
+    chosen = load_settings(method, env_id) if settings is None else settings
+    chosen = dataclasses.replace(chosen, env_kwargs={**chosen.env_kwargs, **(env_kwargs or {})})
+    total = chosen.n_timesteps if steps is None else steps
+    check_at_least("steps", total, 1, whole=True)
+    torch = _learners()
+    place = Path(folder)
+    checkpoint = place / CHECKPOINT
+    task = {**asdict(chosen), "seed": seed}
+    task.pop("n_timesteps")
+    task = json.loads(json.dumps(task))
+    old = _old_progress(checkpoint, task, resume)
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)  # small networks are slower with more
+    envs = None
+    try:
+        envs = _vector(chosen)
+        place.mkdir(parents=True, exist_ok=True)
+        progress = Progress() if old is None else Progress(**old)
+        model = _model(chosen, envs, seed, place) if old is None else _resumed(chosen, envs, seed, place)
+        with stop_on_interrupt() as stop, training_bar(method, total, quiet) as tell:
+            watch = Watch(
+                progress,
+                stop_at=stop_at,
+                checkpoint=lambda model: write_checkpoint(
+                    checkpoint, model, {"task": task, "progress": progress.to_dict()}
+                ),
+                every=CHECKPOINT_STEPS[chosen.algorithm],
+                stop=stop,
+                tell=tell,
+            )
+            left = total - progress.steps
+            if left > 0 and not progress.learnt(stop_at):
+                model.learn(left, callback=_callback(watch), reset_num_timesteps=old is None)
+                watch.clock()
+                watch.mark()
+                write_checkpoint(checkpoint, model, {"task": task, "progress": progress.to_dict()})
+            stopped = "learnt" if progress.learnt(stop_at) else "interrupted" if stop.asked else "steps"
+            return _finish(chosen, seed, model, progress, stopped, place)
+    finally:
+        torch.set_num_threads(threads)
+        if envs is not None:
+            envs.close()
+
+
+def _learners() -> Any:
+    """Return torch, if everything that learns is installed."""
+    try:
+        import sb3_contrib  # noqa: F401
+        import stable_baselines3  # noqa: F401
+        import torch
+    except ImportError:
+        raise InputError(
+            'Expected stable-baselines3 to be installed, to train: pip install "hrsnake[rl]".'
+        ) from None
+    return torch
+
+
+def _old_progress(checkpoint: Path, task: dict[str, Any], resume: bool) -> dict[str, Any] | None:
+    """Return how far the folder's run has come, None for a new one; refuse another's checkpoint."""
+    if not checkpoint.exists():
+        return None
+    if not resume:
+        raise InputError(
+            f"Expected a folder without a run, but there is '{checkpoint}'; resume it, or move it."
+        )
+    old = read_progress(checkpoint)
+    for key, value in task.items():
+        if old["task"].get(key) != value:
+            raise InputError(
+                f"Expected a run with {key}={value!r} to resume in '{checkpoint}', got one with "
+                f"{key}={old['task'].get(key)!r}."
+            )
+    return dict(old["progress"])
+
+
+def _vector(settings: Settings) -> Any:
+    """Make the environments, each of which tells the learner of its episodes."""
+    from stable_baselines3.common.monitor import Monitor
+    from stable_baselines3.common.vec_env import DummyVecEnv
+
+    def one() -> Any:
+        return Monitor(make_env(settings.env_id, env_kwargs=settings.env_kwargs, wrappers=settings.wrappers))
+
+    return DummyVecEnv([one] * settings.n_envs)
+
+
+def _class(settings: Settings) -> Any:
+    from sb3_contrib import TQC
+    from stable_baselines3 import PPO, SAC
+
+    return {"ppo": PPO, "sac": SAC, "tqc": TQC}[settings.algorithm]
+
+
+def _model(settings: Settings, envs: Any, seed: int, folder: Path) -> Any:
+    """Make a new model."""
+    from stable_baselines3 import HerReplayBuffer
+
+    arguments = dict(settings.arguments)
+    for key in ("learning_rate", "clip_range"):
+        if isinstance(arguments.get(key), str):
+            arguments[key] = _Linear(float(arguments[key].removeprefix("lin_")))
+    if isinstance(arguments.get("train_freq"), list):
+        arguments["train_freq"] = tuple(arguments["train_freq"])
+    if "replay_buffer_class" in arguments:
+        arguments["replay_buffer_class"] = {"HerReplayBuffer": HerReplayBuffer}[
+            arguments["replay_buffer_class"]
+        ]
+        # Hindsight takes whole episodes alone: one must have ended before the first is drawn.
+        limit = settings.n_envs * envs.get_attr("spec")[0].max_episode_steps
+        arguments["learning_starts"] = max(arguments.get("learning_starts", 0), limit)
+    try:
+        return _class(settings)(
+            settings.policy, envs, seed=seed, device="cpu", tensorboard_log=_logs(folder), **arguments
+        )
+    except (AssertionError, TypeError, ValueError) as error:
+        raise InputError(f"Expected settings that {settings.algorithm} takes, got: {error}.") from None
+
+
+def _resumed(settings: Settings, envs: Any, seed: int, folder: Path) -> Any:
+    """Return the model of the checkpoint, with random numbers that it has not yet drawn."""
+    model = read_model(
+        folder / CHECKPOINT,
+        lambda file: _class(settings).load(file, env=envs, device="cpu", tensorboard_log=_logs(folder)),
+    )
+    own = np.random.SeedSequence((seed, model.num_timesteps)).generate_state(1)[0]
+    model.set_random_seed(int(own) % 2**31)
+    return model
+
+
+def _logs(folder: Path) -> str | None:
+    return str(folder / "tensorboard") if importlib.util.find_spec("tensorboard") else None
+
+
+@dataclass(frozen=True)
+class _Linear:
+    """Let a setting fall from a start to 0 over the run, as RL Zoo's `lin_` does."""
+
+    start: float
+
+    def __call__(self, remaining: float) -> float:
+        return remaining * self.start
+
+
+def _callback(watch: Watch) -> Any:
+    """Let stable-baselines3 tell the watch what happens."""
+    from stable_baselines3.common.callbacks import BaseCallback
+
+    class Callback(BaseCallback):
+        def _on_rollout_start(self) -> None:
+            watch.between(self.model)
+
+        def _on_step(self) -> bool:
+            return watch.step(self.num_timesteps, self.locals["dones"], self.locals["infos"])
+
+    return Callback()
+
+
+def _finish(
+    settings: Settings, seed: int, model: Any, progress: Progress, stopped: str, folder: Path
+) -> TrainingRun:
+    """Write the policy and the record of the run."""
+    origin = Origin(
+        method=settings.method,
+        env_id=settings.env_id,
+        env_kwargs=settings.env_kwargs,
+        wrappers=settings.evaluation_wrappers,
+        seed=seed,
+        train_steps=progress.steps,
+        versions=Origin.installed_versions(),
+    )
+    NetworkPolicy.from_model(model, origin).save(folder / POLICY)
+    run = TrainingRun(
+        method=settings.method,
+        env_id=settings.env_id,
+        seed=seed,
+        steps=progress.steps,
+        episodes=progress.episodes,
+        success=progress.success,
+        stopped=stopped,
+        cpu_seconds=progress.cpu_seconds,
+        seconds=progress.seconds,
+        curve=tuple(map(tuple, progress.curve)),
+        policy=folder / POLICY,
+        checkpoint=folder / CHECKPOINT,
+    )
+    with replacing(folder / RUN) as part:
+        part.write_text(json.dumps(run.to_dict(), indent=1), encoding="utf-8")
+    return run
