@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 
 from hrsnake_env.arguments import check_at_least
+from hrsnake_env.replay import Trace
 from planners.rl.environments import make_env
 from planners.rl.network import NetworkPolicy
-from planners.rollout import Policy
+from planners.rl.settings import FIRST_SEED
+from planners.rollout import Policy, run_episode
 
-__all__ = ["FACTS", "evaluate", "evaluate_both", "summary"]
-
-FIRST_SEED = 1_000_000
-"""Of the first episode, far from those that trainings begin with."""
+__all__ = ["FACTS", "evaluate", "evaluate_both", "replayed", "summary"]
 
 FACTS = ("success", "clean", "return", "steps", "progress", "worst_depth", "collisions", "pinches")
 """What is measured of an episode."""
@@ -105,6 +104,41 @@ def summary(facts: Sequence[dict[str, Any]]) -> dict[str, float]:
     means = {name: float(np.mean([fact[name] for fact in facts])) for name in FACTS}
     worst = max(fact["worst_depth"] for fact in facts)
     return {"episodes": len(facts), **means, "worst_depth": float(worst)}
+
+
+def replayed(policy: NetworkPolicy, env_id: str | None = None, *, seed: int = FIRST_SEED) -> list[Trace]:
+    """Return the first episode with mean and with sampled actions, for a replay side by side.
+
+    Parameters
+    ----------
+    policy, env_id, seed
+        See `evaluate`.
+    """
+    env = policy.make_env(env_id)
+    try:
+        return [_trace(policy, env, seed, deterministic) for deterministic in (True, False)]
+    finally:
+        env.close()
+
+
+class _Sampled:
+    """Sample, whatever is asked for."""
+
+    def __init__(self, policy: Policy) -> None:
+        self.policy = policy
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> Any:
+        return self.policy.predict(observation, state, episode_start, False)
+
+
+def _trace(policy: NetworkPolicy, env: Any, seed: int, deterministic: bool) -> Trace:
+    policy.reseed(seed)
+    episode = run_episode(env, policy if deterministic else _Sampled(policy), seed=seed)
+    world = env.unwrapped
+    title = f"{world.maze.name}, {policy.origin.method}, {'mean' if deterministic else 'sampled'} actions"
+    return episode.trace(world.maze, title=title, link_radius=world.arm.link_radius)
 
 
 def _env_of(policy: Policy, env_id: str | None) -> Any:

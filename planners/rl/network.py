@@ -6,7 +6,7 @@ import importlib.metadata
 import json
 import os
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -22,7 +22,10 @@ __all__ = ["NetworkPolicy", "Origin"]
 
 Float32 = NDArray[np.float32]
 
-ACTIVATIONS = {"tanh": np.tanh, "relu": lambda values: np.maximum(values, np.float32(0.0))}
+ACTIVATIONS: dict[str, Callable[[Any], Any]] = {
+    "tanh": np.tanh,
+    "relu": lambda values: np.maximum(values, np.float32(0.0)),
+}
 
 LOG_STD = (-20.0, 2.0)
 """Bounds of a squashed policy's log standard deviations, as in stable-baselines3."""
@@ -207,7 +210,7 @@ class NetworkPolicy:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the policy as .npz: arrays, and what else there is as JSON."""
         layers = [*self.hidden, self.mean, self.spread]
-        arrays = {f"weights_{k}": weights for k, (weights, _) in enumerate(layers)}
+        arrays: dict[str, Any] = {f"weights_{k}": weights for k, (weights, _) in enumerate(layers)}
         arrays |= {f"bias_{k}": bias for k, (_, bias) in enumerate(layers)}
         meta = {
             "activation": self.activation,
@@ -275,10 +278,8 @@ class NetworkPolicy:
         trunk = "actor.latent_pi" if squash else "mlp_extractor.policy_net"
         try:
             mean = _layer(state, "actor.mu" if squash else "action_net")
-            if squash:
-                spread = _layer(state, "actor.log_std")
-            else:
-                spread = (np.zeros_like(mean[0]), state["log_std"])
+            constant = None if squash else (np.zeros_like(mean[0]), state["log_std"])
+            spread = constant or _layer(state, "actor.log_std")
         except KeyError:
             raise InputError(f"Expected a Gaussian policy, got {type(model.policy).__name__}.") from None
         numbers = sorted(
@@ -319,7 +320,9 @@ def observation_layout(space: Any) -> tuple[tuple[str, int], ...]:
     InputError
         If a part is not a vector.
     """
-    named = list(space.spaces.items()) if isinstance(space, gym.spaces.Dict) else [("", space)]
+    named: list[tuple[str, Any]] = [("", space)]
+    if isinstance(space, gym.spaces.Dict):
+        named = list(space.spaces.items())
     for name, part in named:
         if not isinstance(part, gym.spaces.Box) or len(part.shape) != 1:
             raise InputError(f"Expected observations made of vectors, got {part} for {name!r}.")

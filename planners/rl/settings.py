@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import importlib
+import math
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hrsnake_env.arguments import check_at_least
+from hrsnake_env.arguments import check_at_least, is_number
 from hrsnake_env.errors import InputError
 from hrsnake_env.registration import ENVIRONMENTS
 from planners.rl.environments import TRAINING_ONLY, WRAPPERS, Wrappers, check_env_id
 
-__all__ = ["METHODS", "Settings", "load_settings", "settings_file"]
+__all__ = ["FIRST_SEED", "METHODS", "Settings", "load_settings", "settings_file"]
 
 METHODS = ("ppo", "ppo-planned", "ppo-residual", "sac", "tqc-her")
 """Each is an algorithm, where its episodes start, and what its actions mean."""
+
+FIRST_SEED = 1_000_000
+"""Of the first episode of an evaluation, far from those that trainings begin with."""
 
 FOLDER = Path(__file__).parent / "hyperparams"
 
@@ -71,6 +75,11 @@ OWN_KEYS = ("n_timesteps", "n_envs", "policy", "env_wrapper", "env_kwargs")
 """What RL Zoo, and this package, make of an entry themselves."""
 
 POLICIES = ("MlpPolicy", "MultiInputPolicy")
+
+BUFFERS = ("HerReplayBuffer",)
+
+SCHEDULES = ("learning_rate", "clip_range")
+"""These may also be written as lin_NUMBER: they then fall to 0 over the run."""
 
 POLICY_KWARGS = ("log_std_init", "n_critics", "n_quantiles", "net_arch")
 
@@ -196,6 +205,13 @@ def _settings(path: Path, method: str, name: str, entry: Any) -> Settings:
     for key in ("n_timesteps", "n_envs"):
         if key in entry or key == "n_timesteps":
             check_at_least(f"{key} {where}", entry.get(key), 1, whole=True)
+    for key in SCHEDULES:
+        _check_schedule(f"{key} {where}", entry.get(key, 0.1))
+    if entry.get("replay_buffer_class", BUFFERS[0]) not in BUFFERS:
+        raise InputError(
+            f"Unknown replay_buffer_class {entry['replay_buffer_class']!r} {where}. "
+            f"Available: {', '.join(BUFFERS)}."
+        )
     if entry.get("policy", "MlpPolicy") not in POLICIES:
         raise InputError(f"Unknown policy {entry['policy']!r} {where}. Available: {', '.join(POLICIES)}.")
     for key in entry.get("policy_kwargs", {}):
@@ -208,6 +224,16 @@ def _settings(path: Path, method: str, name: str, entry: Any) -> Settings:
         arguments={key: value for key, value in entry.items() if key not in OWN_KEYS},
         **{key: entry[key] for key in OWN_KEYS if key in entry and key != "env_wrapper"},
     )
+
+
+def _check_schedule(what: str, value: Any) -> None:
+    """Refuse what is neither a positive number nor lin_NUMBER; YAML takes 3e-4 for text."""
+    try:
+        number = float(value.removeprefix("lin_")) if str(value).startswith("lin_") else value
+    except ValueError:
+        number = value
+    if not (is_number(number) and 0.0 < number < math.inf):
+        raise InputError(f"Expected {what} as a positive number (0.0003) or lin_0.0003, got {value!r}.")
 
 
 def _wrappers(where: str, value: Any) -> Wrappers:

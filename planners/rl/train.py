@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
 import json
 import os
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from hrsnake_env.arguments import check_at_least, is_number
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
-from planners.rl.checkpoints import read_model, read_progress, write_checkpoint
-from planners.rl.environments import make_env
+from planners.rl.checkpoints import read_progress, write_checkpoint
+from planners.rl.models import learners, new_model, resumed_model, vector
 from planners.rl.network import NetworkPolicy, Origin
 from planners.rl.settings import METHODS, Settings, load_settings
 from planners.rl.watch import Progress, Watch, stop_on_interrupt, training_bar
@@ -25,6 +23,12 @@ __all__ = ["METHODS", "TrainingRun", "train"]
 
 CHECKPOINT_STEPS = {"ppo": 50_000, "sac": 10_000, "tqc": 10_000}
 """From one checkpoint to the next: about as long for each, as steps of off-policy learners take longer."""
+
+STOPPED = {
+    "learnt": "the task is learnt",
+    "steps": "all steps are done",
+    "interrupted": "by Ctrl-C; --resume goes on",
+}
 
 CHECKPOINT, POLICY, RUN = "checkpoint.zip", "policy.npz", "run.json"
 
@@ -67,6 +71,16 @@ class TrainingRun:
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON."""
         return {**asdict(self), "policy": str(self.policy), "checkpoint": str(self.checkpoint)}
+
+    def rows(self) -> Iterator[tuple[str, str]]:
+        """Write the figures for people."""
+        share = "no episode from the base" if self.success is None else f"{self.success:.0%}"
+        yield "success", f"{share} of the last episodes from the base, sampled actions"
+        yield "steps", f"{self.steps}, {self.episodes} episodes"
+        yield "time", f"{self.seconds:.1f} s, {self.cpu_seconds:.1f} s of the processor"
+        yield "stopped", STOPPED[self.stopped]
+        yield "policy", str(self.policy)
+        yield "checkpoint", str(self.checkpoint)
 
 
 def train(
@@ -125,7 +139,7 @@ def train(
     chosen = dataclasses.replace(chosen, env_kwargs={**chosen.env_kwargs, **(env_kwargs or {})})
     total = chosen.n_timesteps if steps is None else steps
     check_at_least("steps", total, 1, whole=True)
-    torch = _learners()
+    torch = learners()
     place = Path(folder)
     checkpoint = place / CHECKPOINT
     task = {**asdict(chosen), "seed": seed}
@@ -136,10 +150,14 @@ def train(
     torch.set_num_threads(1)  # small networks are slower with more
     envs = None
     try:
-        envs = _vector(chosen)
+        envs = vector(chosen)
         place.mkdir(parents=True, exist_ok=True)
         progress = Progress() if old is None else Progress(**old)
-        model = _model(chosen, envs, seed, place) if old is None else _resumed(chosen, envs, seed, place)
+        model = (
+            new_model(chosen, envs, seed, place)
+            if old is None
+            else resumed_model(chosen, envs, seed, place / CHECKPOINT)
+        )
         with stop_on_interrupt() as stop, training_bar(method, total, quiet) as tell:
             watch = Watch(
                 progress,
@@ -165,19 +183,6 @@ def train(
             envs.close()
 
 
-def _learners() -> Any:
-    """Return torch, if everything that learns is installed."""
-    try:
-        import sb3_contrib  # noqa: F401
-        import stable_baselines3  # noqa: F401
-        import torch
-    except ImportError:
-        raise InputError(
-            'Expected stable-baselines3 to be installed, to train: pip install "hrsnake[rl]".'
-        ) from None
-    return torch
-
-
 def _old_progress(checkpoint: Path, task: dict[str, Any], resume: bool) -> dict[str, Any] | None:
     """Return how far the folder's run has come, None for a new one; refuse another's checkpoint."""
     if not checkpoint.exists():
@@ -194,74 +199,6 @@ def _old_progress(checkpoint: Path, task: dict[str, Any], resume: bool) -> dict[
                 f"{key}={old['task'].get(key)!r}."
             )
     return dict(old["progress"])
-
-
-def _vector(settings: Settings) -> Any:
-    """Make the environments, each of which tells the learner of its episodes."""
-    from stable_baselines3.common.monitor import Monitor
-    from stable_baselines3.common.vec_env import DummyVecEnv
-
-    def one() -> Any:
-        return Monitor(make_env(settings.env_id, env_kwargs=settings.env_kwargs, wrappers=settings.wrappers))
-
-    return DummyVecEnv([one] * settings.n_envs)
-
-
-def _class(settings: Settings) -> Any:
-    from sb3_contrib import TQC
-    from stable_baselines3 import PPO, SAC
-
-    return {"ppo": PPO, "sac": SAC, "tqc": TQC}[settings.algorithm]
-
-
-def _model(settings: Settings, envs: Any, seed: int, folder: Path) -> Any:
-    """Make a new model."""
-    from stable_baselines3 import HerReplayBuffer
-
-    arguments = dict(settings.arguments)
-    for key in ("learning_rate", "clip_range"):
-        if isinstance(arguments.get(key), str):
-            arguments[key] = _Linear(float(arguments[key].removeprefix("lin_")))
-    if isinstance(arguments.get("train_freq"), list):
-        arguments["train_freq"] = tuple(arguments["train_freq"])
-    if "replay_buffer_class" in arguments:
-        arguments["replay_buffer_class"] = {"HerReplayBuffer": HerReplayBuffer}[
-            arguments["replay_buffer_class"]
-        ]
-        # Hindsight takes whole episodes alone: one must have ended before the first is drawn.
-        limit = settings.n_envs * envs.get_attr("spec")[0].max_episode_steps
-        arguments["learning_starts"] = max(arguments.get("learning_starts", 0), limit)
-    try:
-        return _class(settings)(
-            settings.policy, envs, seed=seed, device="cpu", tensorboard_log=_logs(folder), **arguments
-        )
-    except (AssertionError, TypeError, ValueError) as error:
-        raise InputError(f"Expected settings that {settings.algorithm} takes, got: {error}.") from None
-
-
-def _resumed(settings: Settings, envs: Any, seed: int, folder: Path) -> Any:
-    """Return the model of the checkpoint, with random numbers that it has not yet drawn."""
-    model = read_model(
-        folder / CHECKPOINT,
-        lambda file: _class(settings).load(file, env=envs, device="cpu", tensorboard_log=_logs(folder)),
-    )
-    own = np.random.SeedSequence((seed, model.num_timesteps)).generate_state(1)[0]
-    model.set_random_seed(int(own) % 2**31)
-    return model
-
-
-def _logs(folder: Path) -> str | None:
-    return str(folder / "tensorboard") if importlib.util.find_spec("tensorboard") else None
-
-
-@dataclass(frozen=True)
-class _Linear:
-    """Let a setting fall from a start to 0 over the run, as RL Zoo's `lin_` does."""
-
-    start: float
-
-    def __call__(self, remaining: float) -> float:
-        return remaining * self.start
 
 
 def _callback(watch: Watch) -> Any:
