@@ -133,6 +133,8 @@ def train(
         another run, or has one that shall not be resumed.
     """
     check_at_least("seed", seed, 0, whole=True)
+    if seed >= 2**31:
+        raise InputError(f"Expected a seed under 2**31, got {seed}.")
     if not (is_number(stop_at) and stop_at > 0.0):
         raise InputError(f"Expected a positive stop_at, got {stop_at!r}.")
     chosen = load_settings(method, env_id) if settings is None else settings
@@ -140,47 +142,51 @@ def train(
     total = chosen.n_timesteps if steps is None else steps
     check_at_least("steps", total, 1, whole=True)
     torch = learners()
-    place = Path(folder)
-    checkpoint = place / CHECKPOINT
-    task = {**asdict(chosen), "seed": seed}
-    task.pop("n_timesteps")
-    task = json.loads(json.dumps(task))
-    old = _old_progress(checkpoint, task, resume)
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # small networks are slower with more
-    envs = None
+    envs = vector(chosen)
     try:
-        envs = vector(chosen)
-        place.mkdir(parents=True, exist_ok=True)
-        progress = Progress() if old is None else Progress(**old)
-        model = (
-            new_model(chosen, envs, seed, place)
-            if old is None
-            else resumed_model(chosen, envs, seed, place / CHECKPOINT)
-        )
-        with stop_on_interrupt() as stop, training_bar(method, total, quiet) as tell:
-            watch = Watch(
-                progress,
-                stop_at=stop_at,
-                checkpoint=lambda model: write_checkpoint(
-                    checkpoint, model, {"task": task, "progress": progress.to_dict()}
-                ),
-                every=CHECKPOINT_STEPS[chosen.algorithm],
-                stop=stop,
-                tell=tell,
-            )
-            left = total - progress.steps
-            if left > 0 and not progress.learnt(stop_at):
-                model.learn(left, callback=_callback(watch), reset_num_timesteps=old is None)
-                watch.clock()
-                watch.mark()
-                write_checkpoint(checkpoint, model, {"task": task, "progress": progress.to_dict()})
-            stopped = "learnt" if progress.learnt(stop_at) else "interrupted" if stop.asked else "steps"
-            return _finish(chosen, seed, model, progress, stopped, place)
+        return _run(chosen, envs, seed, total, Path(folder), resume, stop_at, quiet)
     finally:
+        envs.close()
         torch.set_num_threads(threads)
-        if envs is not None:
-            envs.close()
+
+
+def _run(
+    settings: Settings,
+    envs: Any,
+    seed: int,
+    total: int,
+    folder: Path,
+    resume: bool,
+    stop_at: float,
+    quiet: bool,
+) -> TrainingRun:
+    """Train from the start, or from where the folder's checkpoint stands."""
+    checkpoint = folder / CHECKPOINT
+    task = json.loads(json.dumps({**asdict(settings), "seed": seed}))
+    task.pop("n_timesteps")  # a resumed run may be longer
+    old = _old_progress(checkpoint, task, resume)
+    folder.mkdir(parents=True, exist_ok=True)
+    if old is None:
+        progress, model = Progress(), new_model(settings, envs, seed, folder)
+    else:
+        progress, model = Progress(**old), resumed_model(settings, envs, seed, checkpoint)
+
+    def keep(model: Any) -> None:
+        write_checkpoint(checkpoint, model, {"task": task, "progress": progress.to_dict()})
+
+    every = CHECKPOINT_STEPS[settings.algorithm]
+    with stop_on_interrupt() as stop, training_bar(settings.method, total, quiet) as tell:
+        watch = Watch(progress, stop_at=stop_at, checkpoint=keep, every=every, stop=stop, tell=tell)
+        left = total - progress.steps
+        if left > 0 and not progress.learnt(stop_at):
+            model.learn(left, callback=_callback(watch), reset_num_timesteps=old is None)
+            watch.clock()
+            watch.mark()
+            keep(model)
+        stopped = "learnt" if progress.learnt(stop_at) else "interrupted" if stop.asked else "steps"
+        return _finish(settings, seed, model, progress, stopped, folder)
 
 
 def _old_progress(checkpoint: Path, task: dict[str, Any], resume: bool) -> dict[str, Any] | None:
