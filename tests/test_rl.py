@@ -123,7 +123,7 @@ def test_episodes_that_began_elsewhere_do_not_count_as_success():
     progress = Progress()
     for _ in range(200):
         progress.see({"is_success": True, "waypoint": 7})
-    assert progress.success is None and not progress.learnt(0.5)
+    assert progress.success is None and progress.success_planned == 1.0 and not progress.learnt(0.5)
     for success in [False] * 5 + [True] * 19:
         progress.see({"is_success": success, "waypoint": -1})
     assert progress.success == pytest.approx(19 / 24) and not progress.learnt(0.98)
@@ -359,6 +359,7 @@ def test_the_learner_takes_all_that_the_settings_name(method, tmp_path):
     envs = vector(settings)
     model = new_model(settings, envs, 0, tmp_path)
     envs.close()
+    assert settings == load_settings(method, STRAIGHT)
     for name in ("gamma", "batch_size", "n_epochs", "buffer_size"):
         if name in settings.arguments:
             assert getattr(model, name) == settings.arguments[name]

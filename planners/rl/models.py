@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import importlib.util
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,7 +53,7 @@ def new_model(settings: Settings, envs: Any, seed: int, folder: Path) -> Any:
     """Make a new model."""
     from stable_baselines3 import HerReplayBuffer
 
-    arguments = dict(settings.arguments)
+    arguments = copy.deepcopy(settings.arguments)  # stable-baselines3 writes into some
     for key in ("learning_rate", "clip_range"):
         if isinstance(arguments.get(key), str):
             arguments[key] = _Linear(float(arguments[key].removeprefix("lin_")))

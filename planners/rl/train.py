@@ -45,6 +45,8 @@ class TrainingRun:
         Of all environments together, over all resumed runs.
     success : float or None
         Share of the last 100 episodes that began at the base, with actions sampled as in training.
+    success_planned : float or None
+        The same of episodes that began elsewhere, as on a planned motion.
     stopped : {"learnt", "steps", "interrupted"}
         Why it ended.
     cpu_seconds, seconds : float
@@ -61,6 +63,7 @@ class TrainingRun:
     steps: int
     episodes: int
     success: float | None
+    success_planned: float | None
     stopped: str
     cpu_seconds: float
     seconds: float
@@ -76,6 +79,8 @@ class TrainingRun:
         """Write the figures for people."""
         share = "no episode from the base" if self.success is None else f"{self.success:.0%}"
         yield "success", f"{share} of the last episodes from the base, sampled actions"
+        if self.success_planned is not None:
+            yield "from elsewhere", f"{self.success_planned:.0%} of the last that began on a planned motion"
         yield "steps", f"{self.steps}, {self.episodes} episodes"
         yield "time", f"{self.seconds:.1f} s, {self.cpu_seconds:.1f} s of the processor"
         yield "stopped", STOPPED[self.stopped]
@@ -242,6 +247,7 @@ def _finish(
         steps=progress.steps,
         episodes=progress.episodes,
         success=progress.success,
+        success_planned=progress.success_planned,
         stopped=stopped,
         cpu_seconds=progress.cpu_seconds,
         seconds=progress.seconds,

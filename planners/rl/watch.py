@@ -41,8 +41,8 @@ class Progress:
         Of all environments together.
     recent : list of bool
         Success of the last 100 episodes that began at the base.
-    mixed : bool
-        Whether episodes began elsewhere, too.
+    recent_planned : list of bool
+        Success of the last 100 that began elsewhere, as on a planned motion.
     cpu_seconds, seconds : float
         Of the process, and on the clock.
     curve : list of [steps, cpu_seconds, success]
@@ -52,7 +52,7 @@ class Progress:
     steps: int = 0
     episodes: int = 0
     recent: list[bool] = field(default_factory=list)
-    mixed: bool = False
+    recent_planned: list[bool] = field(default_factory=list)
     cpu_seconds: float = 0.0
     seconds: float = 0.0
     curve: list[list[float]] = field(default_factory=list)
@@ -60,24 +60,38 @@ class Progress:
     @property
     def success(self) -> float | None:
         """Share of the last 100 episodes from the base that succeeded; None before the first."""
-        return sum(self.recent) / len(self.recent) if self.recent else None
+        return _share(self.recent)
+
+    @property
+    def success_planned(self) -> float | None:
+        """The same of episodes that began elsewhere."""
+        return _share(self.recent_planned)
 
     def learnt(self, stop_at: float) -> bool:
         """Whether enough episodes from the base have ended, and enough of them well."""
-        least = LEAST_MIXED if self.mixed else WINDOW
+        least = LEAST_MIXED if self.recent_planned else WINDOW
         return len(self.recent) >= least and sum(self.recent) >= stop_at * len(self.recent)
 
     def see(self, info: dict[str, Any]) -> None:
         """Count an episode by its last info."""
         self.episodes += 1
-        if info.get("waypoint", AT_BASE) != AT_BASE:
-            self.mixed = True
-        else:
-            self.recent = [*self.recent[1 - WINDOW :], bool(info["is_success"])]
+        window = self.recent if info.get("waypoint", AT_BASE) == AT_BASE else self.recent_planned
+        window.append(bool(info["is_success"]))
+        del window[:-WINDOW]
+
+    @property
+    def news(self) -> str:
+        """Success so far, for the bar."""
+        parts = ((self.success, "from the base"), (self.success_planned, "from elsewhere"))
+        return ", ".join(f"{share:.0%} {where}" for share, where in parts if share is not None)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON."""
         return asdict(self)
+
+
+def _share(window: list[bool]) -> float | None:
+    return sum(window) / len(window) if window else None
 
 
 class Stop:
@@ -131,8 +145,7 @@ class Watch:
             if done:
                 progress.see(info)
         if any(dones):
-            share = "-" if progress.success is None else f"{progress.success:.0%}"
-            self._tell(steps, f"{share} of {len(progress.recent)} episodes")
+            self._tell(steps, progress.news)
         return not (self.stop.asked or progress.learnt(self.stop_at))
 
     def between(self, model: Any) -> None:
@@ -141,9 +154,11 @@ class Watch:
         progress.steps = model.num_timesteps
         self.clock()
         if progress.success is not None:
-            model.logger.record("rollout/base_success_rate", progress.success)
+            model.logger.record("rollout/success_from_base", progress.success)
             if not progress.curve or progress.steps >= progress.curve[-1][0] + CURVE_STEPS:
                 self.mark()
+        if progress.success_planned is not None:
+            model.logger.record("rollout/success_from_elsewhere", progress.success_planned)
         if self._saved is None or progress.steps >= self._saved + self._every:
             self._checkpoint(model)
             self._saved = progress.steps
