@@ -50,6 +50,13 @@ def quick_run(folder, method="ppo", **options):
     return train(method, STRAIGHT, **options)
 
 
+def write_quick_settings():
+    """Write settings for a command that trains in a second."""
+    Path("s.yml").write_text(
+        "default: {n_timesteps: 128, n_envs: 2, n_steps: 64, batch_size: 128, policy_kwargs: {net_arch: [8]}}"
+    )
+
+
 @pytest.fixture(scope="module")
 def learnt(tmp_path_factory):
     """Return a run on the easiest rung, until the task is learnt."""
@@ -245,6 +252,13 @@ def test_ctrl_c_keeps_what_is_there(tmp_path, monkeypatch):
     assert quick_run(tmp_path, steps=300, resume=True).steps >= 300
 
 
+def test_ctrl_c_is_exit_code_130(run, monkeypatch):
+    write_quick_settings()
+    monkeypatch.setattr(Watch, "step", lambda *_: os.kill(os.getpid(), signal.SIGINT) or False)
+    code, out, err = run("train", STRAIGHT, "--settings", "s.yml", "--out", "r")
+    assert code == 130 and "--resume goes on" in out and "stopped" in err
+
+
 # Policies as arrays
 
 
@@ -295,6 +309,16 @@ def test_a_batch_is_every_one_of_its_observations(learnt):
     actions, _ = policy.predict(np.array(batch))
     for observation, action in zip(batch, actions, strict=True):
         np.testing.assert_allclose(policy.predict(observation)[0], action, atol=1e-6)
+
+
+def test_an_observation_of_another_shape_is_refused(learnt):
+    policy = NetworkPolicy.load(learnt.policy)
+    with pytest.raises(InputError, match="Expected observations with 28 numbers each"):
+        policy.predict(np.zeros(27))
+    model, _ = model_of("ppo", observation="goal")
+    policy = NetworkPolicy.from_model(model, Origin(method="ppo", env_id=STRAIGHT))
+    with pytest.raises(InputError, match="Expected observations with 'achieved_goal', got observation"):
+        policy.predict({"observation": np.zeros(19)})
 
 
 def test_a_policys_file_holds_no_pickle_and_says_where_it_comes_from(learnt):
@@ -411,6 +435,11 @@ def test_a_maze_that_json_cannot_hold_is_refused(tmp_path):
         quick_run(tmp_path, env_kwargs={"maze": Maze.load("fig19")})
 
 
+def test_settings_of_another_method_are_refused(tmp_path):
+    with pytest.raises(InputError, match=r"Expected settings of sac for .*, got those of ppo"):
+        train("sac", STRAIGHT, folder=tmp_path, settings=quick("ppo"))
+
+
 def test_a_learners_refusal_is_one_sentence(tmp_path):
     with pytest.raises(InputError, match="Expected settings that ppo takes"):
         quick_run(tmp_path, settings=quick("ppo", n_envs=1, n_steps=1))
@@ -420,9 +449,7 @@ def test_a_learners_refusal_is_one_sentence(tmp_path):
 
 
 def test_the_command_trains_evaluates_and_resumes(run):
-    Path("s.yml").write_text(
-        "default: {n_timesteps: 128, n_envs: 2, n_steps: 64, batch_size: 128, policy_kwargs: {net_arch: [8]}}"
-    )
+    write_quick_settings()
     code, out, _ = run("train", STRAIGHT, "--settings", "s.yml", "--out", "r", "--json")
     assert code == 0 and json.loads(out)["steps"] == 128
     code, out, _ = run("train", STRAIGHT, "--settings", "s.yml", "--out", "r", "--steps", 200, "--resume")

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import json
 import os
 import zipfile
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import gymnasium as gym
@@ -16,7 +15,8 @@ from numpy.typing import NDArray
 
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
-from planners.rl.environments import Wrappers, make_env
+from planners.rl.environments import make_env
+from planners.rl.origin import Origin
 
 __all__ = ["NetworkPolicy", "Origin"]
 
@@ -29,48 +29,6 @@ ACTIVATIONS: dict[str, Callable[[Any], Any]] = {
 
 LOG_STD = (-20.0, 2.0)
 """Bounds of a squashed policy's log standard deviations, as in stable-baselines3."""
-
-PACKAGES = ("hrsnake", "numpy", "gymnasium", "stable-baselines3", "sb3-contrib", "torch")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Origin:
-    """Say where a policy comes from, and what it acts in.
-
-    Parameters
-    ----------
-    method : str
-        What it was trained by.
-    env_id : str
-        In which environment.
-    env_kwargs : dict
-        For `gymnasium.make`.
-    wrappers : tuple of (name, arguments)
-        That it acts through, innermost first.
-    seed, train_steps : int
-        Of the training.
-    versions : dict
-        Of the packages that trained it.
-    """
-
-    method: str
-    env_id: str
-    env_kwargs: dict[str, Any] = field(default_factory=dict)
-    wrappers: Wrappers = ()
-    seed: int = 0
-    train_steps: int = 0
-    versions: dict[str, str] = field(default_factory=dict)
-
-    @staticmethod
-    def installed_versions() -> dict[str, str]:
-        """Return the versions of the packages that matter here, as far as they are installed."""
-        versions = {}
-        for name in PACKAGES:
-            try:
-                versions[name] = importlib.metadata.version(name)
-            except importlib.metadata.PackageNotFoundError:
-                continue
-        return versions
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -301,7 +259,10 @@ class NetworkPolicy:
     def _vector(self, observation: Any) -> Float32:
         """Return an observation as one vector, or a batch of them."""
         if isinstance(observation, Mapping):
-            parts = [observation[name] for name, _ in self.observation if name in observation]
+            missing = [name for name, _ in self.observation if name not in observation]
+            if missing:
+                raise InputError(f"Expected observations with {missing[0]!r}, got {', '.join(observation)}.")
+            parts = [observation[name] for name, _ in self.observation]
             values = np.concatenate([np.asarray(part, dtype=np.float32) for part in parts], axis=-1)
         else:
             values = np.asarray(observation, dtype=np.float32)

@@ -6,6 +6,7 @@ import dataclasses
 import json
 import os
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -143,17 +144,20 @@ def train(
     if not (is_number(stop_at) and stop_at > 0.0):
         raise InputError(f"Expected a positive stop_at, got {stop_at!r}.")
     chosen = load_settings(method, env_id) if settings is None else settings
+    if (chosen.method, chosen.env_id) != (method, env_id):
+        raise InputError(
+            f"Expected settings of {method} for {env_id}, got those of {chosen.method} for {chosen.env_id}."
+        )
     chosen = dataclasses.replace(chosen, env_kwargs={**chosen.env_kwargs, **(env_kwargs or {})})
     total = chosen.n_timesteps if steps is None else steps
     check_at_least("steps", total, 1, whole=True)
     torch = learners()
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # small networks are slower with more
-    envs = vector(chosen)
     try:
-        return _run(chosen, envs, seed, total, Path(folder), resume, stop_at, quiet)
+        with closing(vector(chosen)) as envs:
+            return _run(chosen, envs, seed, total, Path(folder), resume, stop_at, quiet)
     finally:
-        envs.close()
         torch.set_num_threads(threads)
 
 
@@ -176,7 +180,7 @@ def _run(
     if old is None:
         progress, model = Progress(), new_model(settings, envs, seed, folder)
     else:
-        progress, model = Progress(**old), resumed_model(settings, envs, seed, checkpoint)
+        progress, model = old, resumed_model(settings, envs, seed, checkpoint)
 
     def keep(model: Any) -> None:
         write_checkpoint(checkpoint, model, {"task": task, "progress": progress.to_dict()})
@@ -194,7 +198,7 @@ def _run(
         return _finish(settings, seed, model, progress, stopped, folder)
 
 
-def _old_progress(checkpoint: Path, task: dict[str, Any], resume: bool) -> dict[str, Any] | None:
+def _old_progress(checkpoint: Path, task: dict[str, Any], resume: bool) -> Progress | None:
     """Return how far the folder's run has come, None for a new one; refuse another's checkpoint."""
     if not checkpoint.exists():
         return None
@@ -203,13 +207,17 @@ def _old_progress(checkpoint: Path, task: dict[str, Any], resume: bool) -> dict[
             f"Expected a folder without a run, but there is '{checkpoint}'; resume it, or move it."
         )
     old = read_progress(checkpoint)
+    try:
+        its, progress = dict(old["task"]), Progress(**old["progress"])
+    except (KeyError, TypeError, ValueError):
+        raise InputError(f"Expected a checkpoint of this version in '{checkpoint}', got another.") from None
     for key, value in task.items():
-        if old["task"].get(key) != value:
+        if its.get(key) != value:
             raise InputError(
                 f"Expected a run with {key}={value!r} to resume in '{checkpoint}', got one with "
-                f"{key}={old['task'].get(key)!r}."
+                f"{key}={its.get(key)!r}."
             )
-    return dict(old["progress"])
+    return progress
 
 
 def _callback(watch: Watch) -> Any:

@@ -14,6 +14,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bars
 
+from planners.wrappers import AT_BASE
+
 __all__ = ["Progress", "Stop", "Tell", "Watch", "stop_on_interrupt", "training_bar"]
 
 WINDOW = 100
@@ -24,8 +26,6 @@ LEAST_MIXED = 20
 
 CURVE_STEPS = 2000
 """About so many steps lie between two points of a learning curve."""
-
-AT_BASE = -1
 
 Tell = Callable[[int, str], None]
 """Called with steps done, and the news."""
