@@ -181,6 +181,16 @@ def test_a_replay_buffer_survives(tmp_path):
     assert loads == [256]
 
 
+def test_hindsight_goes_on_without_the_episodes_that_were_cut_off(tmp_path):
+    settings = load_settings("tqc-her", STRAIGHT)
+    runs = [
+        train("tqc-her", STRAIGHT, steps=steps, folder=tmp_path, quiet=True, settings=settings, resume=True)
+        for steps in (400, 4000)
+    ]
+    assert [run.steps for run in runs] == [400, 4000]
+    assert runs[1].episodes >= 4  # four environments, and 600 steps at most
+
+
 def test_the_same_checkpoint_always_goes_on_in_the_same_way(tmp_path):
     quick_run(tmp_path, steps=256)
     checkpoint = (tmp_path / "checkpoint.zip").read_bytes()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import warnings
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -76,5 +77,8 @@ def read_model(path: Path, load: Callable[[io.BytesIO], Any]) -> Any:
     with zipfile.ZipFile(path) as archive:
         model = load(io.BytesIO(archive.read(MODEL)))
         if BUFFER in archive.namelist():
-            model.load_replay_buffer(io.BytesIO(archive.read(BUFFER)))
+            with warnings.catch_warnings():
+                # Episodes begin anew, and so hindsight has to cut off those that were running.
+                warnings.filterwarnings("ignore", message="The last trajectory in the replay buffer")
+                model.load_replay_buffer(io.BytesIO(archive.read(BUFFER)))
     return model
