@@ -1,4 +1,4 @@
-"""The `hrsnake` command: plan, longest, validate, simulate, draw, demo, play, dataset.
+"""The `hrsnake` command: plan, longest, validate, simulate, draw, demo, play, dataset, train, evaluate.
 
 Exit codes: 0 done; 2 bad input, one sentence on stderr; 3 no plan, a motion that is not valid, or a verdict
 that is not clean. `--json` prints one JSON object instead of tables.
@@ -25,6 +25,7 @@ from planners import longest, tables
 from planners.length_trials import motion_path
 from planners.planning import PLANNERS, TIME_BUDGET, plan
 from planners.problem import Motion, PlanningResult, Progress
+from planners.rl.settings import FIRST_SEED, METHODS
 from planners.validation import validate
 
 __all__ = ["app", "main"]
@@ -332,6 +333,83 @@ def dataset_command(
     _print(as_json, {"datasets": [recording.to_dict() for recording in recordings]}, show)
     if not all(recording.n_episodes for recording in recordings):
         raise typer.Exit(NOT_CLEAN)
+
+
+@app.command("train")
+def train_command(
+    env_id: Annotated[str, typer.Argument(metavar="ENV_ID", help="As HyperRedundantMaze-Straight-v0.")],
+    method: Annotated[str, typer.Option("--method", help=f"{', '.join(METHODS)}.")] = "ppo",
+    seed: Annotated[int, typer.Option("--seed", help="The same seed gives the same policy.")] = 0,
+    steps: Annotated[
+        int | None, typer.Option("--steps", help="Of all environments together; by default the settings'.")
+    ] = None,
+    stop_at: Annotated[
+        float, typer.Option("--stop-at", help="Share of the last 100 episodes at which the task is learnt.")
+    ] = 0.98,
+    settings: Annotated[
+        Path | None, typer.Option("--settings", help="Other hyper-parameters, as RL Zoo has them (.yml).")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder; by default ENV_ID-METHOD-SEED.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the folder's checkpoint.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Train a policy, and write it as plain arrays. Ctrl-C: so far, to go on with --resume."""
+    from planners.rl.settings import load_settings
+    from planners.rl.train import train
+
+    folder = Path(f"{env_id}-{method}-{seed}") if out is None else out
+    chosen = load_settings(method, env_id, file=settings)
+    _check_folder(folder)
+    run = train(
+        method,
+        env_id,
+        seed=seed,
+        steps=steps,
+        folder=folder,
+        resume=resume,
+        stop_at=stop_at,
+        quiet=as_json,
+        settings=chosen,
+    )
+    _print(as_json, run.to_dict(), lambda: tables.show_rows(f"{method}: {env_id}", run.rows()))
+    if run.stopped == "interrupted":
+        raise typer.Exit(INTERRUPTED)
+
+
+@app.command("evaluate")
+def evaluate_command(
+    policy: Annotated[Path, typer.Argument(metavar="POLICY", help="A trained policy (.npz).")],
+    env: Annotated[
+        str | None, typer.Option("--env", help="By default the environment that it was trained in.")
+    ] = None,
+    episodes: Annotated[int, typer.Option("--episodes", help="Each with the next seed.")] = 100,
+    seed: Annotated[int, typer.Option("--seed", help="Of the first episode.")] = FIRST_SEED,
+    replay: Annotated[
+        Path | None,
+        typer.Option(
+            "--replay", help="Write a page with the first episode, by mean and by sampled actions (.html)."
+        ),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure a trained policy from the base, with mean and with sampled actions."""
+    from planners.rl.evaluate import evaluate_both, replayed, summary
+    from planners.rl.network import NetworkPolicy
+
+    _check_output(replay, (".html",))
+    acting = NetworkPolicy.load(policy)
+    facts = evaluate_both(acting, env, episodes=episodes, seed=seed)
+    if replay is not None:
+        from hrsnake_env.replay import save_replay
+
+        save_replay(replayed(acting, env, seed=seed), replay)
+    figures = {actions: summary(rows) for actions, rows in facts.items()}
+    name = acting.origin.env_id if env is None else env
+    _print(
+        as_json,
+        {"env_id": name, "summary": figures, "episodes": facts, "replay": _name(replay)},
+        lambda: tables.show_evaluation(f"{acting.origin.method}: {name}", figures, replay),
+    )
 
 
 @bench_app.command("speed")

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "show_demo",
+    "show_evaluation",
     "show_geometry",
     "show_longest",
     "show_plan",
@@ -45,6 +46,19 @@ def show_rows(title: str, rows: Rows) -> None:
     for name, figure in rows:
         table.add_row(name, figure)
     Console().print(table)
+
+
+def show_evaluation(title: str, figures: dict[str, dict[str, float]], replay: Path | None) -> None:
+    """Print what a policy does with mean and with sampled actions, side by side."""
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    table.add_column("", style="bold")
+    for actions in figures:
+        table.add_column(f"{actions} actions", justify="right")
+    for name in next(iter(figures.values())):
+        table.add_row(name.replace("_", " "), *(f"{row[name]:.4g}" for row in figures.values()))
+    Console().print(table)
+    if replay is not None:
+        print(f"replay: {replay}")
 
 
 def seconds(value: float) -> str:

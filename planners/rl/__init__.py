@@ -1,0 +1,1 @@
+"""Reinforcement learning: settings, training, policies as plain arrays, and their evaluation."""
