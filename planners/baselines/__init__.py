@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from planners.baselines.path_following import plan_path_following
+from planners.baselines.pseudo_inverse import plan_pseudo_inverse
+from planners.baselines.virtual_torque import plan_virtual_torque
 from planners.problem import Candidate
 from planners.query import Query
 
@@ -12,5 +14,7 @@ __all__ = ["BASELINES"]
 
 BASELINES: dict[str, Callable[[Query], Candidate]] = {
     "follow": plan_path_following,
+    "virtual-torque": plan_virtual_torque,
+    "pseudo-inverse": plan_pseudo_inverse,
 }
 """All baselines by name."""
