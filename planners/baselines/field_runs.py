@@ -45,8 +45,8 @@ class Gains:
         Distance at which it begins, in link lengths.
     lead : float
         How many control points the tip counts for beyond its own.
-    ahead : float
-        How far poles are ahead along the path, in link lengths.
+    ahead, poles_ahead : float
+        How far ahead along the path the tip is led, and how far poles are, in link lengths.
     damping : float
         Of the pseudo-inverse.
     """
@@ -55,6 +55,7 @@ class Gains:
     reach: float
     lead: float = 0.0
     ahead: float = 0.0
+    poles_ahead: float = 0.0
     damping: float = 0.0
 
 
@@ -106,7 +107,7 @@ def new_run(n_links: int, per_link: int) -> kernel.Run:
         forces=np.empty((n * per_link, 2)),
         links=np.empty(n * per_link, dtype=np.int64),
         matrix=np.empty((n, n)),
-        vectors=np.zeros((5, n)),
+        vectors=np.zeros((6, n)),
         trial=np.empty(n),
         chain=np.empty((n, 2)),
     )

@@ -62,7 +62,7 @@ def plan_pseudo_inverse(query: Query) -> Candidate:
     spacing = max(float(even[1]), 1e-9)
 
     def move(task: kernel.Task, run: kernel.Run, gains: Gains, states: FloatArray) -> tuple[int, int]:
-        ahead = max(1, round(gains.ahead / spacing))
-        return kernel.lead_tip(task, run, path, spacing, ahead, gains.damping, states)
+        ahead, poles_ahead = (max(1, round(way / spacing)) for way in (gains.ahead, gains.poles_ahead))
+        return kernel.lead_tip(task, run, path, spacing, ahead, poles_ahead, gains.damping, states)
 
     return plan_by_forces(query, move, ATTEMPTS, PER_LINK)

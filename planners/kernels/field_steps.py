@@ -41,7 +41,7 @@ LONGEST = 0.03
 """Largest movement of a joint in a step, in link lengths."""
 
 KEPT = 0.3
-"""Share of a distance to a wall that a step leaves at least."""
+"""Share of a distance to a wall, beyond the margin, that a step leaves at least, to first order."""
 
 MARGIN = 1e-3
 """Smallest distance of links to walls, in link lengths."""
@@ -112,7 +112,7 @@ class Run(NamedTuple):
     links : array, shape (n per_link,)
         Of control points.
     matrix : array, shape (n, n)
-    vectors : array, shape (5, n)
+    vectors : array, shape (6, n)
     trial, chain : array, shape (n,), (n + 1, 2)
     """
 
@@ -188,27 +188,28 @@ def _held(task: Task, state: FloatArray, i: int, torque: float) -> bool:
 
 @njit(cache=True)
 def assemble(task: Task, run: Run, k: int, n: int, n_contacts: int) -> None:
-    """Compute torques (vectors[0]) and the factor of the matrix of a step from the forces on control points.
+    """Compute what moves the arm, and the factor of the matrix of a step.
 
-    Joints that are pressed against their limits get neither (and vectors[1] is 0 there, otherwise 1).
+    Filled are vectors[0], torques of the forces on control points; vectors[5], torques of walls; vectors[1],
+    1 for coordinates that move and 0 for joints pressed against their limits, which get no torques.
     """
-    torques, moves, row = run.vectors[0], run.vectors[1], run.vectors[2]
-    torques[: k + 1], moves[: k + 1] = 0.0, 1.0
+    torques, moves, row, pushes = run.vectors[0], run.vectors[1], run.vectors[2], run.vectors[5]
+    torques[: k + 1], moves[: k + 1], pushes[: k + 1] = 0.0, 1.0, 0.0
     run.forces[0] *= 1.0 + task.lead
     add_torques(run.points, k, task.heading, run.places, run.links, run.forces, n, torques)
     fill_drag(run.points, k, task.heading, run.places, run.links, n, RIDGE * task.per_link, run.matrix)
     for c in range(n_contacts):
-        gap = max(run.contacts[c, 4], 0.1 * MARGIN)
+        gap = max(run.contacts[c, 4] - MARGIN, 0.01 * MARGIN)  # stiff before it is too small
         force = task.barrier * task.per_link * (1.0 / gap - 1.0 / task.reach)
         slope = STEP * task.barrier * task.per_link / gap**2
         contact_row(run.contacts[c], run.points, k, task.heading, row)
         for a in range(k + 1):
-            torques[a] += force * row[a]
+            pushes[a] += force * row[a]
             for b in range(a + 1):
                 run.matrix[a, b] += slope * row[a] * row[b]
     for a in range(1, k + 1):
-        if _held(task, run.state, a, torques[a]):
-            torques[a], moves[a] = 0.0, 0.0
+        if _held(task, run.state, a, torques[a] + pushes[a]):
+            torques[a], pushes[a], moves[a] = 0.0, 0.0, 0.0
             for b in range(k + 1):
                 if b <= a:
                     run.matrix[a, b] = 0.0
@@ -235,7 +236,7 @@ def _free_share(task: Task, run: Run, k: int, n_contacts: int, velocity: FloatAr
         opening = 0.0
         for a in range(k + 1):
             opening += row[a] * velocity[a]
-        room = (1.0 - KEPT) * run.contacts[c, 4]
+        room = (1.0 - KEPT) * max(run.contacts[c, 4] - MARGIN, 0.0)
         if -opening * time > room:
             share = min(share, room / (-opening * time))
     return share
@@ -358,7 +359,7 @@ def descend(
         if _noted(run, np.log(max(here, 1e-308)) - away * 1e-6, 1e-4):
             return m, STUCK
         assemble(task, run, k, n, n_contacts)
-        velocity[: k + 1] = run.vectors[0, : k + 1]
+        velocity[: k + 1] = run.vectors[0, : k + 1] + run.vectors[5, : k + 1]
         solve_lower(run.matrix, k + 1, velocity)
         solve_upper(run.matrix, k + 1, velocity)
         if not advance(task, run, k, n_contacts, velocity, max(0.5 * away, 0.1 * task.stop)):
@@ -382,7 +383,7 @@ def _climb(path: FloatArray, at: int, x: float, y: float, look: int) -> int:
 
 
 @njit(cache=True)
-def _draw_to_poles(task: Task, run: Run, n: int, path: FloatArray, ahead: int, spacing: float) -> None:
+def _draw_to_poles(run: Run, n: int, path: FloatArray, ahead: int, spacing: float) -> None:
     """Draw each control point to its pole: the path some way ahead of the place nearest to it."""
     for c in range(n):
         x, y = run.places[c, 0], run.places[c, 1]
@@ -396,7 +397,14 @@ def _draw_to_poles(task: Task, run: Run, n: int, path: FloatArray, ahead: int, s
 
 @njit(cache=True)
 def lead_tip(
-    task: Task, run: Run, path: FloatArray, spacing: float, ahead: int, damping: float, states: FloatArray
+    task: Task,
+    run: Run,
+    path: FloatArray,
+    spacing: float,
+    ahead: int,
+    poles_ahead: int,
+    damping: float,
+    states: FloatArray,
 ) -> tuple[int, int]:
     """Lead the tip along a path, with the rest of the arm drawn to poles in the null space of its velocity.
 
@@ -408,8 +416,9 @@ def lead_tip(
         From the base to the goal, in even steps.
     spacing : float
         Their length.
-    ahead : int
-        Steps from the place nearest to a control point to its pole.
+    ahead, poles_ahead : int
+        Steps from the place nearest to the tip to where it is led, and from the place nearest to a control
+        point to its pole.
     damping : float
         Of the pseudo-inverse.
 
@@ -428,20 +437,26 @@ def lead_tip(
             return m, DONE
         if run.state[0] >= run.state.shape[0] - 1.0:
             return m, FULL
-        _draw_to_poles(task, run, n, path, ahead, spacing)
-        tip[:] = run.forces[0]
+        _draw_to_poles(run, n, path, poles_ahead, spacing)
+        aim = path[min(run.nearest[0] + ahead, path.shape[0] - 1)]
+        tip[:] = (aim - run.points[0]) / max(np.hypot(aim[0] - run.points[0, 0], aim[1] - run.points[0, 1]), ahead * spacing)
         if _noted(run, run.nearest[0] * spacing, 1e-3):
             return m, STUCK
         assemble(task, run, k, n, n_contacts)
         # In coordinates in which the matrix of the step is the identity.
         _fill_tip_jacobian(task, run, k, jacobian)
-        wish = run.vectors[0]
+        wish, pushed = run.vectors[0], run.vectors[5]
+        solve_lower(run.matrix, k + 1, wish)
+        solve_lower(run.matrix, k + 1, pushed)
         for axis in range(2):
             columns[: k + 1] = jacobian[axis, : k + 1]
             solve_lower(run.matrix, k + 1, columns)
             jacobian[axis, : k + 1] = columns[: k + 1]
-        solve_lower(run.matrix, k + 1, wish)
+            for a in range(k + 1):
+                tip[axis] -= columns[a] * pushed[a]
+        # What walls do comes first, and as far as damping goes before the tip as well.
         redundant_velocity(jacobian, k + 1, tip, wish, damping, velocity)
+        velocity[: k + 1] += pushed[: k + 1]
         solve_upper(run.matrix, k + 1, velocity)
         if not advance(task, run, k, n_contacts, velocity, max(0.5 * away, 0.1 * task.stop)):
             return m, STUCK
