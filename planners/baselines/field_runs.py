@@ -26,8 +26,8 @@ MOST_BENT = 3.0
 MOST_STEPS = 200
 """Steps for each link length of path, from which on no more are tried."""
 
-CHUNK = 256
-"""Steps between two looks at the clock."""
+CHUNK, CHUNK_LINKS = 256, 100
+"""Steps between two looks at the clock; for more links than these fewer, as each takes longer."""
 
 CONTACTS_PER_LINK = 16
 """Places of a link near walls that are minded, on average."""
@@ -162,11 +162,12 @@ def _attempt(query: Query, geometry: Geometry, move: Mover, gains: Gains, per_li
     links_of_path = math.ceil(geometry.path.length / query.arm.link_length)
     run = new_run(2 * links_of_path + 2, per_link)
     task = new_task(query, geometry, gains, per_link)
-    states = np.empty((max(CHUNK, math.ceil(1.0 / kernel.STEP) + 1), len(run.state)))
+    states = np.empty((CHUNK, len(run.state)))
+    chunk = max(1, round(CHUNK * min(1.0, CHUNK_LINKS / len(run.state)) ** 3))
     n, ending = kernel.push_straight(task, run, states)
     found, n_all, late = [states[:n].copy()], n, False
     while ending == kernel.GOING and n_all < MOST_STEPS * (links_of_path + 1) and not late:
-        n, ending = move(task, run, gains, states)
+        n, ending = move(task, run, gains, states[:chunk])
         found.append(states[:n].copy())
         n_all += n
         late = query.late

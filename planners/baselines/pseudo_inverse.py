@@ -24,16 +24,18 @@ from planners.query import Query
 
 __all__ = ["ATTEMPTS", "PER_LINK", "SPACING", "plan_pseudo_inverse"]
 
-PER_LINK = 6
+PER_LINK = 12
 """Control points of a link, each with a pole."""
 
 SPACING = 0.02
 """Distance of the path's points, in link lengths."""
 
 ATTEMPTS = (
-    Gains(barrier=0.01, reach=0.15, ahead=0.2, damping=0.02),
-    Gains(barrier=0.002, reach=0.1, ahead=0.2, damping=0.02),
-    Gains(barrier=0.01, reach=0.15, ahead=0.6, damping=0.2),
+    Gains(barrier=0.05, reach=0.3, ahead=0.2, poles_ahead=0.05, damping=0.12),
+    Gains(barrier=0.1, reach=0.5, ahead=0.2, poles_ahead=0.05, damping=0.12),
+    Gains(barrier=0.05, reach=0.3, ahead=0.1, poles_ahead=0.05, damping=0.08),
+    Gains(barrier=0.01, reach=0.15, ahead=0.2, poles_ahead=0.1, damping=0.15),
+    Gains(barrier=0.02, reach=0.15, ahead=0.1, poles_ahead=0.1, damping=0.3),
 )
 """Gains that are tried in turn."""
 

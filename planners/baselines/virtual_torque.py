@@ -32,9 +32,10 @@ PER_LINK = 10
 """Control points of a link."""
 
 ATTEMPTS = (
-    Gains(barrier=0.01, reach=0.15),
-    Gains(barrier=0.002, reach=0.1),
-    Gains(barrier=0.01, reach=0.15, lead=30.0),
+    Gains(barrier=0.1, reach=0.5, lead=5.0),
+    Gains(barrier=0.01, reach=0.15, lead=10.0),
+    Gains(barrier=0.03, reach=0.3, lead=10.0),
+    Gains(barrier=0.003, reach=0.15, lead=5.0),
 )
 """Gains that are tried in turn."""
 
