@@ -107,7 +107,7 @@ def new_run(n_links: int, per_link: int) -> kernel.Run:
         forces=np.empty((n * per_link, 2)),
         links=np.empty(n * per_link, dtype=np.int64),
         matrix=np.empty((n, n)),
-        vectors=np.zeros((6, n)),
+        vectors=np.zeros((5, n)),
         trial=np.empty(n),
         chain=np.empty((n, 2)),
     )

@@ -112,7 +112,7 @@ class Run(NamedTuple):
     links : array, shape (n per_link,)
         Of control points.
     matrix : array, shape (n, n)
-    vectors : array, shape (6, n)
+    vectors : array, shape (5, n)
     trial, chain : array, shape (n,), (n + 1, 2)
     """
 
@@ -190,12 +190,14 @@ def _held(task: Task, state: FloatArray, i: int, torque: float) -> bool:
 def assemble(task: Task, run: Run, k: int, n: int, n_contacts: int) -> None:
     """Compute what moves the arm, and the factor of the matrix of a step.
 
-    Filled are vectors[0], torques of the forces on control points; vectors[5], torques of walls; vectors[1],
+    Filled are vectors[0], torques of the forces on control points; vectors[4], torques of walls; vectors[1],
     1 for coordinates that move and 0 for joints pressed against their limits, which get no torques.
     """
-    torques, moves, row, pushes = run.vectors[0], run.vectors[1], run.vectors[2], run.vectors[5]
-    torques[: k + 1], moves[: k + 1], pushes[: k + 1] = 0.0, 1.0, 0.0
-    run.forces[0] *= 1.0 + task.lead
+    torques, moves, row, pushes = run.vectors[0], run.vectors[1], run.vectors[2], run.vectors[4]
+    for a in range(k + 1):
+        torques[a], moves[a], pushes[a] = 0.0, 1.0, 0.0
+    for axis in range(2):
+        run.forces[0, axis] *= 1.0 + task.lead
     add_torques(run.points, k, task.heading, run.places, run.links, run.forces, n, torques)
     fill_drag(run.points, k, task.heading, run.places, run.links, n, RIDGE * task.per_link, run.matrix)
     for c in range(n_contacts):
@@ -354,12 +356,13 @@ def descend(
         for c in range(n):
             x, y = (run.places[c, 0] - origin[0]) / cell, (run.places[c, 1] - origin[1]) / cell
             run.forces[c, 0], run.forces[c, 1] = field_at(field, x, y)
-        i, j = (run.points[0] - origin) / cell
-        here = u[int(np.rint(j)), int(np.rint(i))]
+        x, y = (run.points[0, 0] - origin[0]) / cell, (run.points[0, 1] - origin[1]) / cell
+        here = u[int(np.rint(y)), int(np.rint(x))]
         if _noted(run, np.log(max(here, 1e-308)) - away * 1e-6, 1e-4):
             return m, STUCK
         assemble(task, run, k, n, n_contacts)
-        velocity[: k + 1] = run.vectors[0, : k + 1] + run.vectors[5, : k + 1]
+        for a in range(k + 1):
+            velocity[a] = run.vectors[0, a] + run.vectors[4, a]
         solve_lower(run.matrix, k + 1, velocity)
         solve_upper(run.matrix, k + 1, velocity)
         if not advance(task, run, k, n_contacts, velocity, max(0.5 * away, 0.1 * task.stop)):
@@ -383,6 +386,14 @@ def _climb(path: FloatArray, at: int, x: float, y: float, look: int) -> int:
 
 
 @njit(cache=True)
+def _drawn(point: FloatArray, aim: FloatArray, far: float) -> tuple[float, float]:
+    """Return the velocity towards an aim: 1 where it is as far as it should be, less where it is nearer."""
+    x, y = aim[0] - point[0], aim[1] - point[1]
+    size = max(np.hypot(x, y), far)
+    return x / size, y / size
+
+
+@njit(cache=True)
 def _draw_to_poles(run: Run, n: int, path: FloatArray, ahead: int, spacing: float) -> None:
     """Draw each control point to its pole: the path some way ahead of the place nearest to it."""
     for c in range(n):
@@ -390,9 +401,7 @@ def _draw_to_poles(run: Run, n: int, path: FloatArray, ahead: int, spacing: floa
         at = _climb(path, run.nearest[c], x, y, 4)
         run.nearest[c] = at
         pole = path[min(at + ahead, path.shape[0] - 1)]
-        fx, fy = pole[0] - x, pole[1] - y
-        size = max(np.hypot(fx, fy), ahead * spacing)
-        run.forces[c, 0], run.forces[c, 1] = fx / size, fy / size
+        run.forces[c, 0], run.forces[c, 1] = _drawn(run.places[c], pole, ahead * spacing)
 
 
 @njit(cache=True)
@@ -427,7 +436,7 @@ def lead_tip(
     n, ending : int
         As in `descend`.
     """
-    velocity, columns = run.vectors[3], run.vectors[4]
+    velocity = run.vectors[3]
     jacobian = np.empty((2, run.state.shape[0]))
     tip = np.empty(2)
     for m in range(states.shape[0]):
@@ -439,24 +448,24 @@ def lead_tip(
             return m, FULL
         _draw_to_poles(run, n, path, poles_ahead, spacing)
         aim = path[min(run.nearest[0] + ahead, path.shape[0] - 1)]
-        tip[:] = (aim - run.points[0]) / max(np.hypot(aim[0] - run.points[0, 0], aim[1] - run.points[0, 1]), ahead * spacing)
+        tip[0], tip[1] = _drawn(run.points[0], aim, ahead * spacing)
         if _noted(run, run.nearest[0] * spacing, 1e-3):
             return m, STUCK
         assemble(task, run, k, n, n_contacts)
         # In coordinates in which the matrix of the step is the identity.
         _fill_tip_jacobian(task, run, k, jacobian)
-        wish, pushed = run.vectors[0], run.vectors[5]
+        wish, pushed = run.vectors[0], run.vectors[4]
         solve_lower(run.matrix, k + 1, wish)
         solve_lower(run.matrix, k + 1, pushed)
         for axis in range(2):
-            columns[: k + 1] = jacobian[axis, : k + 1]
-            solve_lower(run.matrix, k + 1, columns)
-            jacobian[axis, : k + 1] = columns[: k + 1]
+            column = jacobian[axis]
+            solve_lower(run.matrix, k + 1, column)
             for a in range(k + 1):
-                tip[axis] -= columns[a] * pushed[a]
+                tip[axis] -= column[a] * pushed[a]
         # What walls do comes first, and as far as damping goes before the tip as well.
         redundant_velocity(jacobian, k + 1, tip, wish, damping, velocity)
-        velocity[: k + 1] += pushed[: k + 1]
+        for a in range(k + 1):
+            velocity[a] += pushed[a]
         solve_upper(run.matrix, k + 1, velocity)
         if not advance(task, run, k, n_contacts, velocity, max(0.5 * away, 0.1 * task.stop)):
             return m, STUCK
