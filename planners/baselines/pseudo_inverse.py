@@ -31,6 +31,7 @@ SPACING = 0.02
 """Distance of the path's points, in link lengths."""
 
 ATTEMPTS = (
+    Gains(barrier=0.05, reach=0.3, ahead=0.2, poles_ahead=0.2, damping=0.05),
     Gains(barrier=0.05, reach=0.3, ahead=0.2, poles_ahead=0.05, damping=0.12),
     Gains(barrier=0.1, reach=0.5, ahead=0.2, poles_ahead=0.05, damping=0.12),
     Gains(barrier=0.05, reach=0.3, ahead=0.1, poles_ahead=0.05, damping=0.08),
