@@ -154,7 +154,8 @@ def plan_by_forces(query: Query, move: Mover, attempts: Iterable[Gains], per_lin
     query.tell("plan", 1.0)
     if refused:
         return _solved(min(refused)[2], geometry, start)
-    return _failed(query, min(ended, key=lambda outcome: _way_left(outcome, query, geometry)), geometry, start)
+    nearest = min(ended, key=lambda outcome: _way_left(outcome, query, geometry))
+    return _failed(query, nearest, geometry, start)
 
 
 def _attempt(query: Query, geometry: Geometry, move: Mover, gains: Gains, per_link: int) -> _Outcome:

@@ -17,7 +17,8 @@ import math
 import numpy as np
 
 from planners.baselines.field_runs import Gains, base_frame, plan_by_forces
-from planners.kernels import field_steps as kernel
+from planners.kernels import field_moves as kernel
+from planners.kernels.field_steps import Run, Task
 from planners.kernels.types import FloatArray
 from planners.problem import Candidate
 from planners.query import Query
@@ -64,7 +65,7 @@ def plan_pseudo_inverse(query: Query) -> Candidate:
     path = np.column_stack([np.interp(even, arc, points[:, axis]) for axis in range(2)])
     spacing = max(float(even[1]), 1e-9)
 
-    def move(task: kernel.Task, run: kernel.Run, gains: Gains, states: FloatArray) -> tuple[int, int]:
+    def move(task: Task, run: Run, gains: Gains, states: FloatArray) -> tuple[int, int]:
         ahead, poles_ahead = (max(1, round(way / spacing)) for way in (gains.ahead, gains.poles_ahead))
         return kernel.lead_tip(task, run, path, spacing, ahead, poles_ahead, gains.damping, states)
 

@@ -20,7 +20,8 @@ import dataclasses
 import numpy as np
 
 from planners.baselines.field_runs import Gains, base_frame, plan_by_forces
-from planners.kernels import field_steps as kernel
+from planners.kernels import field_moves as kernel
+from planners.kernels.field_steps import Run, Task
 from planners.kernels.types import FloatArray
 from planners.potential import laplace_potential
 from planners.problem import Candidate
@@ -64,7 +65,7 @@ def plan_virtual_torque(query: Query) -> Candidate:
     origin = base_frame(potential.origin, query)
     cell = potential.cell / query.arm.link_length
 
-    def move(task: kernel.Task, run: kernel.Run, _: Gains, states: FloatArray) -> tuple[int, int]:
+    def move(task: Task, run: Run, _: Gains, states: FloatArray) -> tuple[int, int]:
         return kernel.descend(task, run, potential.u, field, origin, cell, states)
 
     return plan_by_forces(query, move, ATTEMPTS, PER_LINK)

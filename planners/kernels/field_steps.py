@@ -1,6 +1,6 @@
-"""Steps of an arm in a field of forces, and of one whose tip is led along a path.
+"""Steps of an arm on which forces act.
 
-Both move the arm as a viscous medium would that holds its control points: the velocity v solves
+The arm moves as a viscous medium would that holds its control points: the velocity v solves
 (J^T J + R) v = J^T F, where F are the forces on the control points and on the places nearest to walls, and R
 holds a little friction and, for the stiff repulsion of walls, its slope, so that steps need not be tiny.
 Lengths and coordinates are those of `planners.kernels.field_arm`.
@@ -14,22 +14,18 @@ import numpy as np
 from numba import njit
 
 from planners.kernels.fed_arm import is_free
+from planners.kernels.field_algebra import factorise
 from planners.kernels.field_arm import (
     RELEASE,
     add_torques,
     contact_row,
-    factorise,
     fill_drag,
     find_contacts,
     keep_limits,
     place_controls,
     place_points,
-    redundant_velocity,
-    solve_lower,
-    solve_upper,
 )
-from planners.kernels.grid import _node_ascent
-from planners.kernels.types import BoolArray, FloatArray, IntArray
+from planners.kernels.types import FloatArray, IntArray
 
 GOING, DONE, STUCK, FULL = range(4)
 """How a run ends: not yet, at the goal, without progress, with the whole arm out."""
@@ -48,9 +44,6 @@ MARGIN = 1e-3
 
 HALVINGS = 6
 """A step that is not free is halved at most this often."""
-
-PATIENCE = 300
-"""Steps without progress after which a run is stuck."""
 
 RIDGE = 0.02
 """Friction of feed and joints, over that of a control point that is a link length away."""
@@ -131,38 +124,6 @@ class Run(NamedTuple):
 
 
 @njit(cache=True)
-def fill_field(u: FloatArray, blocked_x: BoolArray, blocked_y: BoolArray, field: FloatArray) -> None:
-    """Compute the direction in which a potential rises at each node.
-
-    Parameters
-    ----------
-    u, blocked_x, blocked_y
-        As in `planners.potential.Potential`.
-    field : array, shape (ny, nx, 2)
-        Filled with unit vectors, and zeros where there is no direction.
-    """
-    for j in range(1, u.shape[0] - 1):
-        for i in range(1, u.shape[1] - 1):
-            x, y = _node_ascent(u, blocked_x, blocked_y, j, i)
-            size = max(np.hypot(x, y), 1e-300)
-            field[j, i, 0], field[j, i, 1] = x / size, y / size
-
-
-@njit(cache=True)
-def field_at(field: FloatArray, x: float, y: float) -> tuple[float, float]:
-    """Interpolate a field at a place in cells; zero outside of the grid."""
-    i, j = int(np.floor(x)), int(np.floor(y))
-    gx, gy = 0.0, 0.0
-    if 0 <= i < field.shape[1] - 1 and 0 <= j < field.shape[0] - 1:
-        for dj in range(2):
-            for di in range(2):
-                weight = (1.0 - abs(x - i - di)) * (1.0 - abs(y - j - dj))
-                gx += weight * field[j + dj, i + di, 0]
-                gy += weight * field[j + dj, i + di, 1]
-    return gx, gy
-
-
-@njit(cache=True)
 def place(task: Task, run: Run) -> tuple[int, int, int, float]:
     """Place the arm of a run's state, its control points and its contacts.
 
@@ -183,7 +144,7 @@ def place(task: Task, run: Run) -> tuple[int, int, int, float]:
 def _held(task: Task, state: FloatArray, i: int, torque: float) -> bool:
     """Tell whether a joint is pressed against its limit."""
     limit = min(RELEASE * (state[0] - i), task.most_bent)
-    return abs(state[i]) >= limit - 1e-9 and torque * state[i] >= 0.0
+    return bool(abs(state[i]) >= limit - 1e-9 and torque * state[i] >= 0.0)
 
 
 @njit(cache=True)
@@ -278,10 +239,11 @@ def advance(task: Task, run: Run, k: int, n_contacts: int, velocity: FloatArray,
     time = min(min(STEP, stop) / fastest, 4.0 * STEP)
     time *= _free_share(task, run, k, n_contacts, velocity, time)
     feed = run.state[0]
+    least_feed = max(np.ceil(feed) - 1.0, 1.0)
     for _ in range(HALVINGS):
         run.trial[:] = run.state
         # A joint passes the base at a pose: between poses angles would be ahead of what the feeder allows.
-        run.trial[0] = min(max(feed + time * velocity[0], max(np.ceil(feed) - 1.0, 1.0)), np.floor(feed) + 1.0)
+        run.trial[0] = min(max(feed + time * velocity[0], least_feed), np.floor(feed) + 1.0)
         for a in range(1, k + 1):
             run.trial[a] += time * velocity[a]
         keep_limits(run.trial, task.most_bent)
@@ -296,17 +258,8 @@ def advance(task: Task, run: Run, k: int, n_contacts: int, velocity: FloatArray,
 
 
 @njit(cache=True)
-def _noted(run: Run, progress: float, least: float) -> bool:
-    """Note progress; tell whether there has been none for too long."""
-    if progress > run.best[0] + least:
-        run.best[0], run.best[1] = progress, 0.0
-    run.best[1] += 1.0
-    return bool(run.best[1] > PATIENCE)
-
-
-@njit(cache=True)
 def push_straight(task: Task, run: Run, states: FloatArray) -> tuple[int, int]:
-    """Push the first link out of the feeder; arguments and results as in `descend`."""
+    """Push the first link out of the feeder; arguments and results as in `field_moves.descend`."""
     n = int(np.ceil(1.0 / STEP))
     for m in range(n + 1):
         run.state[0] = m / n
@@ -317,166 +270,3 @@ def push_straight(task: Task, run: Run, states: FloatArray) -> tuple[int, int]:
         if k != 0:
             break
     return n + 1, GOING
-
-
-@njit(cache=True)
-def descend(
-    task: Task, run: Run, u: FloatArray, field: FloatArray, origin: FloatArray, cell: float, states: FloatArray
-) -> tuple[int, int]:
-    """Let the field's forces on control points move the arm (virtual torques).
-
-    Parameters
-    ----------
-    task, run
-        The run goes on from where it was.
-    u : array, shape (ny, nx)
-        A potential that rises towards the goal.
-    field : array, shape (ny, nx, 2)
-        Its directions (`fill_field`).
-    origin, cell
-        Place of node (0, 0), and spacing of the nodes.
-    states : array, shape (n_max, n)
-        Filled with the states gone through.
-
-    Returns
-    -------
-    n : int
-        Number of states.
-    ending : int
-        One of GOING, DONE, STUCK and FULL.
-    """
-    velocity = run.vectors[3]
-    for m in range(states.shape[0]):
-        k, n, n_contacts, _ = place(task, run)
-        away = np.hypot(run.points[0, 0] - task.goal[0], run.points[0, 1] - task.goal[1])
-        if away <= task.stop:
-            return m, DONE
-        if run.state[0] >= run.state.shape[0] - 1.0:
-            return m, FULL
-        for c in range(n):
-            x, y = (run.places[c, 0] - origin[0]) / cell, (run.places[c, 1] - origin[1]) / cell
-            run.forces[c, 0], run.forces[c, 1] = field_at(field, x, y)
-        x, y = (run.points[0, 0] - origin[0]) / cell, (run.points[0, 1] - origin[1]) / cell
-        here = u[int(np.rint(y)), int(np.rint(x))]
-        if _noted(run, np.log(max(here, 1e-308)) - away * 1e-6, 1e-4):
-            return m, STUCK
-        assemble(task, run, k, n, n_contacts)
-        for a in range(k + 1):
-            velocity[a] = run.vectors[0, a] + run.vectors[4, a]
-        solve_lower(run.matrix, k + 1, velocity)
-        solve_upper(run.matrix, k + 1, velocity)
-        if not advance(task, run, k, n_contacts, velocity, max(0.5 * away, 0.1 * task.stop)):
-            return m, STUCK
-        states[m] = run.state
-    return states.shape[0], GOING
-
-
-@njit(cache=True)
-def _climb(path: FloatArray, at: int, x: float, y: float, look: int) -> int:
-    """Return the place of a path, from one nearby on, that is nearest to a point."""
-    while True:
-        best, least = at, np.hypot(path[at, 0] - x, path[at, 1] - y)
-        for other in range(max(at - look, 0), min(at + look + 1, path.shape[0])):
-            away = np.hypot(path[other, 0] - x, path[other, 1] - y)
-            if away < least:
-                best, least = other, away
-        if best == at:
-            return at
-        at = best
-
-
-@njit(cache=True)
-def _drawn(point: FloatArray, aim: FloatArray, far: float) -> tuple[float, float]:
-    """Return the velocity towards an aim: 1 where it is as far as it should be, less where it is nearer."""
-    x, y = aim[0] - point[0], aim[1] - point[1]
-    size = max(np.hypot(x, y), far)
-    return x / size, y / size
-
-
-@njit(cache=True)
-def _draw_to_poles(run: Run, n: int, path: FloatArray, ahead: int, spacing: float) -> None:
-    """Draw each control point to its pole: the path some way ahead of the place nearest to it."""
-    for c in range(n):
-        x, y = run.places[c, 0], run.places[c, 1]
-        at = _climb(path, run.nearest[c], x, y, 4)
-        run.nearest[c] = at
-        pole = path[min(at + ahead, path.shape[0] - 1)]
-        run.forces[c, 0], run.forces[c, 1] = _drawn(run.places[c], pole, ahead * spacing)
-
-
-@njit(cache=True)
-def lead_tip(
-    task: Task,
-    run: Run,
-    path: FloatArray,
-    spacing: float,
-    ahead: int,
-    poles_ahead: int,
-    damping: float,
-    states: FloatArray,
-) -> tuple[int, int]:
-    """Lead the tip along a path, with the rest of the arm drawn to poles in the null space of its velocity.
-
-    Parameters
-    ----------
-    task, run, states
-        As in `descend`.
-    path : array, shape (n_path, 2)
-        From the base to the goal, in even steps.
-    spacing : float
-        Their length.
-    ahead, poles_ahead : int
-        Steps from the place nearest to the tip to where it is led, and from the place nearest to a control
-        point to its pole.
-    damping : float
-        Of the pseudo-inverse.
-
-    Returns
-    -------
-    n, ending : int
-        As in `descend`.
-    """
-    velocity = run.vectors[3]
-    jacobian = np.empty((2, run.state.shape[0]))
-    tip = np.empty(2)
-    for m in range(states.shape[0]):
-        k, n, n_contacts, _ = place(task, run)
-        away = np.hypot(run.points[0, 0] - task.goal[0], run.points[0, 1] - task.goal[1])
-        if away <= task.stop:
-            return m, DONE
-        if run.state[0] >= run.state.shape[0] - 1.0:
-            return m, FULL
-        _draw_to_poles(run, n, path, poles_ahead, spacing)
-        aim = path[min(run.nearest[0] + ahead, path.shape[0] - 1)]
-        tip[0], tip[1] = _drawn(run.points[0], aim, ahead * spacing)
-        if _noted(run, run.nearest[0] * spacing, 1e-3):
-            return m, STUCK
-        assemble(task, run, k, n, n_contacts)
-        # In coordinates in which the matrix of the step is the identity.
-        _fill_tip_jacobian(task, run, k, jacobian)
-        wish, pushed = run.vectors[0], run.vectors[4]
-        solve_lower(run.matrix, k + 1, wish)
-        solve_lower(run.matrix, k + 1, pushed)
-        for axis in range(2):
-            column = jacobian[axis]
-            solve_lower(run.matrix, k + 1, column)
-            for a in range(k + 1):
-                tip[axis] -= column[a] * pushed[a]
-        # What walls do comes first, and as far as damping goes before the tip as well.
-        redundant_velocity(jacobian, k + 1, tip, wish, damping, velocity)
-        for a in range(k + 1):
-            velocity[a] += pushed[a]
-        solve_upper(run.matrix, k + 1, velocity)
-        if not advance(task, run, k, n_contacts, velocity, max(0.5 * away, 0.1 * task.stop)):
-            return m, STUCK
-        states[m] = run.state
-    return states.shape[0], GOING
-
-
-@njit(cache=True)
-def _fill_tip_jacobian(task: Task, run: Run, k: int, jacobian: FloatArray) -> None:
-    """Compute how fast each coordinate moves the tip; those that are held do not."""
-    jacobian[0, 0], jacobian[1, 0] = np.cos(task.heading), np.sin(task.heading)
-    for a in range(1, k + 1):
-        jacobian[0, a] = -run.vectors[1, a] * (run.points[0, 1] - run.points[a, 1])
-        jacobian[1, a] = run.vectors[1, a] * (run.points[0, 0] - run.points[a, 0])
