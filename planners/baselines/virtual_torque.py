@@ -10,7 +10,8 @@ What is ours is what the paper does not say. The field is the Laplace potential 
 with, and the force on a control point is along its gradient, of unit size. Where links are near to walls
 there are more control points, exactly there, and a force away from the wall. Descent of feed and joint angles
 is in the metric of the control points' movements: plain joint angles would make steps a matter of how long
-the arm is.
+the arm is. Steps allow for how steep the repulsion of walls is (`planners.kernels.field_steps`). The last two
+carry the method in tight turns and with many links: what it passes here says nothing about the reference.
 """
 
 from __future__ import annotations
