@@ -8,6 +8,8 @@ from planners.baselines.b_spline import plan_b_spline
 from planners.baselines.backbone import plan_backbone
 from planners.baselines.outer_wall import plan_outer_wall
 from planners.baselines.path_following import plan_path_following
+from planners.baselines.pseudo_inverse import plan_pseudo_inverse
+from planners.baselines.virtual_torque import plan_virtual_torque
 from planners.problem import Candidate
 from planners.query import Query
 
@@ -18,5 +20,7 @@ BASELINES: dict[str, Callable[[Query], Candidate]] = {
     "outer-wall": plan_outer_wall,
     "b-spline": plan_b_spline,
     "backbone": plan_backbone,
+    "virtual-torque": plan_virtual_torque,
+    "pseudo-inverse": plan_pseudo_inverse,
 }
 """All baselines by name."""
