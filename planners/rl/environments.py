@@ -10,7 +10,7 @@ import gymnasium as gym
 import hrsnake_env
 from hrsnake_env.errors import InputError
 from hrsnake_env.registration import ENVIRONMENTS
-from planners.wrappers import PlannedResets, ResidualFollower
+from planners.wrappers import ActionRepeat, PlannedResets, ResidualFollower
 
 __all__ = ["TRAINING_ONLY", "WRAPPERS", "Wrappers", "check_env_id", "make_env"]
 
@@ -18,6 +18,7 @@ Wrappers = tuple[tuple[str, dict[str, Any]], ...]
 """Names with arguments, innermost first."""
 
 WRAPPERS: dict[str, Any] = {
+    "planners.wrappers.ActionRepeat": ActionRepeat,
     "planners.wrappers.PlannedResets": PlannedResets,
     "planners.wrappers.ResidualFollower": ResidualFollower,
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import importlib.util
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -64,8 +65,9 @@ def new_model(settings: Settings, envs: Any, seed: int, folder: Path) -> Any:
             arguments["replay_buffer_class"]
         ]
         # Hindsight takes whole episodes alone: one must have ended before the first is drawn.
-        limit = settings.n_envs * envs.get_attr("spec")[0].max_episode_steps
-        arguments["learning_starts"] = max(arguments.get("learning_starts", 0), limit)
+        limit = envs.get_attr("spec")[0].max_episode_steps / settings.repeat
+        least = settings.n_envs * math.ceil(limit)
+        arguments["learning_starts"] = max(arguments.get("learning_starts", 0), least)
     try:
         return _class(settings)(
             settings.policy, envs, seed=seed, device="cpu", tensorboard_log=_logs(folder), **arguments

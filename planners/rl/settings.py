@@ -41,6 +41,7 @@ OFF_POLICY = (
     "gradient_steps",
     "learning_rate",
     "learning_starts",
+    "n_steps",
     "policy_kwargs",
     "replay_buffer_class",
     "replay_buffer_kwargs",
@@ -128,6 +129,12 @@ class Settings:
     def evaluation_wrappers(self) -> Wrappers:
         """The wrappers without those that only training has."""
         return tuple(entry for entry in self.wrappers if entry[0] not in TRAINING_ONLY)
+
+    @property
+    def repeat(self) -> int:
+        """Steps of the environment to a decision of the learner."""
+        repeats = (entry[1].get("repeat", 1) for entry in self.wrappers)
+        return math.prod(int(repeat) for repeat in repeats)
 
 
 def settings_file(method: str) -> Path:
