@@ -1,12 +1,20 @@
-"""Kernels for planners that sample configurations of an arm out of a straight feeder.
+"""Kernels for planners that sample configurations of an arm out of a straight feeder; all in link lengths.
 
-A state holds the feed in link lengths and the angles of joints 1 to n_links - 1, in rad; joint 0 never leaves
-the feeder. A joint that has not passed the base is straight whatever the state says, and one that has may
-bend as far as `release` times the way past the base: so every state means a pose that the feeder allows, the
-pose changes continuously with the state, and no sample is lost to the feeder.
+A state holds the feed and the angles of joints 1 to n_links - 1, in rad; joint 0 never leaves the feeder. A
+joint that has not passed the base is straight whatever the state says, and one that has may bend as far as
+`release` times the way past the base: so every state means a pose that the feeder allows, the pose changes
+continuously with the state, and no sample is lost to the feeder.
+
+Along an edge between two states the arm runs through poses that keep the checker's step limit, and between
+these feed and joint angles change linearly, as in any motion. It is this that is checked: a piece is free if
+in its middle everything is farther away than anything moves within it (Schwarzer, Saha and Latombe, "Adaptive
+dynamic collision checking for single and multiple articulated robots in complex environments", IEEE
+Transactions on Robotics 21(3), 2005), and halved if not.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -14,28 +22,52 @@ from numba import njit
 from planners.kernels.types import FloatArray
 
 PARTS = 8
-"""By how many parts of an edge it is judged how far joints move along it."""
+"""By how many parts of an edge it is first judged how far joints move along it."""
 
 MOST_LEVELS = 12
-"""An edge is halved at most this often."""
+"""An edge is halved at most this often for its poses, and each piece again for the check."""
+
+STEP = 0.045
+"""How far a joint may move between poses: nine tenths of what the checker allows."""
+
+WHOLE = 1e-12
+"""How near to a whole number a feed is taken for it."""
+
+
+class FedScene(NamedTuple):
+    """What an arm out of a feeder is among.
+
+    Attributes
+    ----------
+    base_pose : array, shape (3,)
+        (x, y, heading).
+    walls : array, shape (n_walls, 2, 2)
+        Segments.
+    release : float
+        How far a joint may bend, in rad per link length that it is past the base.
+    margin : float
+        How far links keep off walls.
+    apart : float
+        How far links that are no neighbours keep off each other, besides twice the margin: two link radii.
+    """
+
+    base_pose: FloatArray
+    walls: FloatArray
+    release: float
+    margin: float
+    apart: float
 
 
 @njit(cache=True)
-def place_arm(
-    state: FloatArray, length: float, release: float, base_pose: FloatArray, points: FloatArray
-) -> int:
+def place_arm(state: FloatArray, scene: FedScene, points: FloatArray) -> int:
     """Compute where the part of the arm in front of the base is.
 
     Parameters
     ----------
     state : array, shape (n_links,)
-        Feed in link lengths, then joint angles.
-    length : float
-        Of a link.
-    release : float
-        In rad per link length past the base.
-    base_pose : array, shape (3,)
-        (x, y, heading).
+        Feed, then joint angles.
+    scene : FedScene
+        The feeder.
     points : array, shape (n_links + 1, 2)
         Filled with the base and the joints past it, tip last.
 
@@ -48,20 +80,20 @@ def place_arm(
     -----
     The caller guarantees a feed between 0 and n_links.
     """
-    n_links, heading = state.shape[0], base_pose[2]
-    points[0, 0], points[0, 1] = base_pose[0], base_pose[1]
+    n_links, heading = state.shape[0], scene.base_pose[2]
+    points[0, 0], points[0, 1] = scene.base_pose[0], scene.base_pose[1]
     first = n_links - int(np.ceil(state[0])) + 1  # of the joints past the base
     if first > n_links:
         return 1
-    way = (state[0] - (n_links - first)) * length
-    points[1, 0] = base_pose[0] + way * np.cos(heading)
-    points[1, 1] = base_pose[1] + way * np.sin(heading)
+    way = state[0] - (n_links - first)
+    points[1, 0] = points[0, 0] + way * np.cos(heading)
+    points[1, 1] = points[0, 1] + way * np.sin(heading)
     n = 2
     for joint in range(first, n_links):
-        limit = release * (state[0] - (n_links - joint))
+        limit = scene.release * (state[0] - (n_links - joint))
         heading += min(max(state[joint], -limit), limit)
-        points[n, 0] = points[n - 1, 0] + length * np.cos(heading)
-        points[n, 1] = points[n - 1, 1] + length * np.sin(heading)
+        points[n, 0] = points[n - 1, 0] + np.cos(heading)
+        points[n, 1] = points[n - 1, 1] + np.sin(heading)
         n += 1
     return n
 
@@ -69,10 +101,6 @@ def place_arm(
 @njit(cache=True)
 def _meet(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> bool:
     """Tell whether segments ab and cd meet; those along one line do not."""
-    if max(a[0], b[0]) < min(c[0], d[0]) or max(c[0], d[0]) < min(a[0], b[0]):
-        return False
-    if max(a[1], b[1]) < min(c[1], d[1]) or max(c[1], d[1]) < min(a[1], b[1]):
-        return False
     abx, aby, cdx, cdy = b[0] - a[0], b[1] - a[1], d[0] - c[0], d[1] - c[1]
     of_c = abx * (c[1] - a[1]) - aby * (c[0] - a[0])
     of_d = abx * (d[1] - a[1]) - aby * (d[0] - a[0])
@@ -84,8 +112,33 @@ def _meet(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> bool:
 
 
 @njit(cache=True)
-def is_free(points: FloatArray, n: int, walls: FloatArray) -> bool:
-    """Tell whether a chain of points meets neither a wall nor itself.
+def squared_distance(p: FloatArray, a: FloatArray, b: FloatArray) -> float:
+    """Compute the squared distance of a point from a segment."""
+    x, y, along_x, along_y = p[0] - a[0], p[1] - a[1], b[0] - a[0], b[1] - a[1]
+    squared = along_x * along_x + along_y * along_y
+    share = 0.0 if squared == 0.0 else min(max((x * along_x + y * along_y) / squared, 0.0), 1.0)
+    x, y = x - share * along_x, y - share * along_y
+    return x * x + y * y
+
+
+@njit(cache=True)
+def keeps_off(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, need: float) -> bool:
+    """Tell whether segments ab and cd do not meet and are at least `need` from each other."""
+    if max(a[0], b[0]) + need < min(c[0], d[0]) or max(c[0], d[0]) + need < min(a[0], b[0]):
+        return True
+    if max(a[1], b[1]) + need < min(c[1], d[1]) or max(c[1], d[1]) + need < min(a[1], b[1]):
+        return True
+    if _meet(a, b, c, d):
+        return False
+    least = min(min(squared_distance(a, c, d), squared_distance(b, c, d)), min(squared_distance(c, a, b), squared_distance(d, a, b)))
+    return least >= need * need
+
+
+@njit(cache=True)
+def is_clear(points: FloatArray, n: int, scene: FedScene, need: float) -> bool:
+    """Tell whether a chain of points keeps off the walls, and twice as far and `apart` off itself.
+
+    The first piece, from the base on, stays on the feeder's axis and only must not meet a wall.
 
     Parameters
     ----------
@@ -93,106 +146,194 @@ def is_free(points: FloatArray, n: int, walls: FloatArray) -> bool:
         Of `place_arm`.
     n : int
         Number of points.
-    walls : array, shape (n_walls, 2, 2)
-        Segments.
+    scene : FedScene
+        The walls.
+    need : float
+        Distance.
 
     Notes
     -----
     The caller guarantees that the first point is in the free space.
     """
     for k in range(n - 2, -1, -1):  # the tip is what meets something most often
-        for wall in range(walls.shape[0]):
-            if _meet(points[k], points[k + 1], walls[wall, 0], walls[wall, 1]):
+        off = need if k > 0 else 0.0
+        for wall in range(scene.walls.shape[0]):
+            if not keeps_off(points[k], points[k + 1], scene.walls[wall, 0], scene.walls[wall, 1], off):
                 return False
+    off = 2.0 * need + scene.apart
     for k in range(n - 1):
         for other in range(k + 2, n - 1):
-            if _meet(points[k], points[k + 1], points[other], points[other + 1]):
+            if not keeps_off(points[k], points[k + 1], points[other], points[other + 1], off):
                 return False
     return True
 
 
 @njit(cache=True)
-def state_is_free(
-    state: FloatArray,
-    length: float,
-    release: float,
-    base_pose: FloatArray,
-    walls: FloatArray,
-    points: FloatArray,
-) -> bool:
-    """Tell whether the arm is free; arguments as in `place_arm` and `is_free`."""
-    return is_free(points, place_arm(state, length, release, base_pose, points), walls)
+def state_is_clear(state: FloatArray, scene: FedScene) -> bool:
+    """Tell whether the arm keeps the margin."""
+    points = np.empty((state.shape[0] + 1, 2))
+    return is_clear(points, place_arm(state, scene, points), scene, scene.margin)
 
 
 @njit(cache=True)
-def edge_levels(
-    a: FloatArray,
-    b: FloatArray,
-    length: float,
-    release: float,
-    base_pose: FloatArray,
-    step: float,
-    points: FloatArray,
-) -> int:
-    """Compute how often the edge from a to b must be halved for no joint to move more than a step.
+def _moved(before: FloatArray, n_before: int, after: FloatArray, n_after: int) -> float:
+    """Compute how far the joint moves that moves farthest; joints are counted from the tip."""
+    most = 0.0
+    for back in range(1, min(n_before, n_after) + 1):
+        x = after[n_after - back, 0] - before[n_before - back, 0]
+        y = after[n_after - back, 1] - before[n_before - back, 1]
+        most = max(most, x * x + y * y)
+    return float(np.sqrt(most))
 
-    It is judged by what joints move in each of some parts of the edge.
-    """
-    n_links = a.shape[0]
-    before, state = np.empty((n_links + 1, 2)), np.empty(n_links)
-    n_before, most = place_arm(a, length, release, base_pose, before), 0.0
+
+@njit(cache=True)
+def _between(a: FloatArray, b: FloatArray, share: float, state: FloatArray) -> None:
+    """Fill in the state at a share of the way from a to b."""
+    for k in range(a.shape[0]):
+        state[k] = b[k] if share == 1.0 else a[k] + share * (b[k] - a[k])
+
+
+@njit(cache=True)
+def _levels(a: FloatArray, b: FloatArray, scene: FedScene) -> int:
+    """Estimate how often the edge from a to b must be halved for no joint to move more than a step."""
+    n_links, most = a.shape[0], 0.0
+    state, before, points = np.empty(n_links), np.empty((n_links + 1, 2)), np.empty((n_links + 1, 2))
+    n_before = place_arm(a, scene, before)
     for part in range(1, PARTS + 1):
-        for k in range(n_links):
-            state[k] = a[k] + (b[k] - a[k]) * part / PARTS
-        n = place_arm(state, length, release, base_pose, points)
-        for back in range(1, min(n, n_before) + 1):  # counted from the tip: joints come out at the base
-            most = max(
-                most,
-                np.hypot(
-                    points[n - back, 0] - before[n_before - back, 0],
-                    points[n - back, 1] - before[n_before - back, 1],
-                ),
-            )
-        before[:n], n_before = points[:n], n
+        _between(a, b, part / PARTS, state)
+        n = place_arm(state, scene, points)
+        most = max(most, _moved(before, n_before, points, n))
+        before, points, n_before = points, before, n
     levels = 0
-    while levels < MOST_LEVELS and PARTS * most > step * (1 << levels):
+    while levels < MOST_LEVELS and PARTS * most > STEP * (1 << levels):
         levels += 1
     return levels
 
 
 @njit(cache=True)
-def edge_is_free(
-    a: FloatArray,
-    b: FloatArray,
-    length: float,
-    release: float,
-    base_pose: FloatArray,
-    walls: FloatArray,
-    step: float,
-    points: FloatArray,
-) -> bool:
-    """Tell whether the arm is free at b and all along the edge from a to b, in steps.
+def _pose_shares(a: FloatArray, b: FloatArray, levels: int) -> FloatArray:
+    """Return at which shares of an edge there are poses: evenly, and where a joint passes the base."""
+    first, last = min(a[0], b[0]), max(a[0], b[0])
+    low, high = int(np.ceil(first)), int(np.floor(last))
+    n = (1 << levels) + 1
+    shares = np.empty(n + max(high - low + 1, 0))
+    for k in range(n):
+        shares[k] = k / (n - 1)
+    n_passing = 0
+    if first < last:
+        for whole in range(low, high + 1):
+            shares[n + n_passing] = (whole - a[0]) / (b[0] - a[0])
+            n_passing += 1
+    shares = np.sort(shares[: n + n_passing])
+    kept = 1
+    for k in range(1, len(shares)):
+        if shares[k] > shares[kept - 1]:
+            shares[kept] = shares[k]
+            kept += 1
+    return shares[:kept]
+
+
+@njit(cache=True)
+def edge_poses(a: FloatArray, b: FloatArray, scene: FedScene) -> FloatArray:
+    """Compute the poses along an edge.
 
     Parameters
     ----------
     a, b : array, shape (n_links,)
-        States; a is known to be free.
-    length, release, base_pose, walls, points
-        As in `place_arm` and `is_free`.
-    step : float
-        How far a joint may move from one check to the next, in maze units.
+        States.
+    scene : FedScene
+        The feeder.
+
+    Returns
+    -------
+    poses : array, shape (n_poses, n_links)
+        From a to b: states whose angles are those that the arm has, so near to each other that no joint moves
+        more than a step, and among them those at which a joint passes the base.
     """
-    n = place_arm(b, length, release, base_pose, points)
-    if not is_free(points, n, walls):
+    n_links, levels = a.shape[0], _levels(a, b, scene)
+    before, points = np.empty((n_links + 1, 2)), np.empty((n_links + 1, 2))
+    while True:
+        shares = _pose_shares(a, b, levels)
+        poses, most, n_before = np.empty((len(shares), n_links)), 0.0, 0
+        for k in range(len(shares)):
+            pose = poses[k]
+            _between(a, b, shares[k], pose)
+            if abs(pose[0] - np.round(pose[0])) < WHOLE:
+                pose[0] = np.round(pose[0])
+            for joint in range(1, n_links):
+                limit = scene.release * max(pose[0] - (n_links - joint), 0.0)
+                pose[joint] = min(max(pose[joint], -limit), limit)
+            n = place_arm(pose, scene, points)
+            if k > 0:
+                most = max(most, max(_moved(before, n_before, points, n), abs(pose[0] - poses[k - 1, 0])))
+            before, points, n_before = points, before, n
+        if most <= STEP or levels == MOST_LEVELS:
+            return poses
+        levels += 1
+
+
+@njit(cache=True)
+def _piece_is_clear(a: FloatArray, b: FloatArray, scene: FedScene) -> bool:
+    """Tell whether the arm keeps off everything while it moves from one pose to the next.
+
+    No joint is farther from the line between its places at a piece's ends than an eighth of the sum of the
+    squares of what the headings behind it change by.
+    """
+    n_links, turn, bend = a.shape[0], 0.0, 0.0
+    for joint in range(1, n_links):
+        turn += b[joint] - a[joint]
+        bend += turn * turn / 8.0
+    state, points = np.empty(n_links), np.empty((3, n_links + 1, 2))
+    n, stack = np.empty(3, dtype=np.int64), np.empty((MOST_LEVELS + 2, 2))
+    stack[0, 0], stack[0, 1] = 0.0, 1.0
+    height = 1
+    while height > 0:
+        height -= 1
+        start, end = stack[height, 0], stack[height, 1]
+        middle = 0.5 * (start + end)
+        for k, share in enumerate((start, middle, end)):
+            _between(a, b, share, state)
+            n[k] = place_arm(state, scene, points[k])
+        moved = max(
+            _moved(points[0], n[0], points[1], n[1]), _moved(points[1], n[1], points[2], n[2])
+        ) + bend * (end - start) * (end - start)
+        if is_clear(points[1], n[1], scene, max(moved, scene.margin)):
+            continue
+        if moved <= scene.margin or height + 2 > len(stack):
+            return False
+        if not is_clear(points[1], n[1], scene, scene.margin):
+            return False
+        stack[height, 0], stack[height, 1] = middle, end
+        stack[height + 1, 0], stack[height + 1, 1] = start, middle
+        height += 2
+    return True
+
+
+@njit(cache=True)
+def edge_is_clear(a: FloatArray, b: FloatArray, scene: FedScene) -> bool:
+    """Tell whether the arm keeps the margin at b and all along the edge from a to b.
+
+    Parameters
+    ----------
+    a, b : array, shape (n_links,)
+        States; the arm is known to keep the margin at a.
+    scene : FedScene
+        Feeder and walls.
+    """
+    if not state_is_clear(b, scene):
         return False
-    levels = edge_levels(a, b, length, release, base_pose, step, points)
-    state = np.empty(a.shape[0])
-    for level in range(1, levels + 1):  # coarse to fine, for what is not free shows soon
-        parts = 1 << level
-        for part in range(1, parts, 2):
-            for k in range(a.shape[0]):
-                state[k] = a[k] + (b[k] - a[k]) * part / parts
-            n = place_arm(state, length, release, base_pose, points)
-            if not is_free(points, n, walls):
+    poses = edge_poses(a, b, scene)
+    last, points = len(poses) - 1, np.empty((a.shape[0] + 1, 2))
+    stride = 1
+    while stride < last:
+        stride *= 2
+    while stride > 1:  # coarse to fine, for what is not free shows soon
+        half = stride // 2
+        for k in range(half, last, stride):
+            if not is_clear(points, place_arm(poses[k], scene, points), scene, scene.margin):
                 return False
+        stride = half
+    for k in range(last):
+        if not _piece_is_clear(poses[k], poses[k + 1], scene):
+            return False
     return True
