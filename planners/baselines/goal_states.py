@@ -27,6 +27,9 @@ PROGRESS = 0.05
 SHARE_OF_RADIUS = 0.9
 """Of the goal radius, within which tips end."""
 
+POOL = 4
+"""Goal states are chosen from the straightest, so many times as many as are wanted."""
+
 CELL, TURN = 0.15, 0.3
 """Of chains that end within so many link lengths and rad of each other, one is kept."""
 
@@ -72,7 +75,8 @@ def grown_goal_states(
     joints = np.arange(1, len(chains.places))
     while len(joints):
         there = joints[np.hypot(*(chains.places[joints] - guide.points[-1]).T) <= guide.radius]
-        states = [_state(chains, int(joint)) for joint in rng.permutation(there)]
+        there = there[np.argsort(chains.bent[there])]
+        states = [_state(chains, int(joint)) for joint in there[: POOL * number]]
         states = [state for state in states if arm.is_clear(state)]
         if states:
             return _spread(states, number), _points(chains, int(there[0])) * arm.link_length
@@ -94,12 +98,13 @@ def _roots(arm: FedArm, guide: Guide, rng: np.random.Generator) -> Chains:
     seen = np.array([farthest_seen(place, 0, guide, arm.scene.walls) for place in places])
     rest = guide.spacing * (len(guide.points) - 1 - seen) + np.hypot(*(places - guide.points[seen]).T)
     parents = np.concatenate([[-1], np.zeros(ROOTS, dtype=np.int64)])
-    return Chains(places, np.full(ROOTS + 1, heading), np.zeros(ROOTS + 1), parents, seen, rest)
+    none = np.zeros(ROOTS + 1)
+    return Chains(places, np.full(ROOTS + 1, heading), none, parents, seen, rest, none)
 
 
 def _chosen(chains: Chains, joints: IntArray, rng: np.random.Generator) -> IntArray:
     """Choose from which joints to grow on: one of each cell, and not too many."""
-    joints = rng.permutation(joints)
+    joints = joints[np.argsort(chains.bent[joints])]
     cells = np.column_stack([chains.places[joints] / CELL, chains.headings[joints] / TURN])
     _, first = np.unique(np.floor(cells).astype(np.int64), axis=0, return_index=True)
     joints = joints[np.sort(first)]

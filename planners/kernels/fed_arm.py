@@ -24,8 +24,11 @@ from planners.kernels.types import FloatArray
 PARTS = 8
 """By how many parts of an edge it is first judged how far joints move along it."""
 
-MOST_LEVELS = 12
-"""An edge is halved at most this often for its poses, and each piece again for the check."""
+MOST_HALVINGS = 12
+"""A piece between poses is halved at most this often."""
+
+MOST_STEPS = 4096
+"""Poses of an edge are not tried closer than that."""
 
 STEP = 0.045
 """How far a joint may move between poses: nine tenths of what the checker allows."""
@@ -135,8 +138,8 @@ def keeps_off(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, need: 
 
 
 @njit(cache=True)
-def is_clear(points: FloatArray, n: int, scene: FedScene, need: float) -> bool:
-    """Tell whether a chain of points keeps off the walls, and twice as far and `apart` off itself.
+def is_clear(points: FloatArray, n: int, scene: FedScene, needs: FloatArray) -> bool:
+    """Tell whether a chain of points keeps off the walls, and `apart` off itself.
 
     The first piece, from the base on, stays on the feeder's axis and only must not meet a wall.
 
@@ -148,22 +151,23 @@ def is_clear(points: FloatArray, n: int, scene: FedScene, need: float) -> bool:
         Number of points.
     scene : FedScene
         The walls.
-    need : float
-        Distance.
+    needs : array, shape (at least n,)
+        What each point needs around it; a link needs what the more demanding of its ends does, and two links
+        the sum.
 
     Notes
     -----
     The caller guarantees that the first point is in the free space.
     """
     for k in range(n - 2, -1, -1):  # the tip is what meets something most often
-        off = need if k > 0 else 0.0
+        need = max(needs[k], needs[k + 1]) if k > 0 else 0.0
         for wall in range(scene.walls.shape[0]):
-            if not keeps_off(points[k], points[k + 1], scene.walls[wall, 0], scene.walls[wall, 1], off):
+            if not keeps_off(points[k], points[k + 1], scene.walls[wall, 0], scene.walls[wall, 1], need):
                 return False
-    off = 2.0 * need + scene.apart
     for k in range(n - 1):
         for other in range(k + 2, n - 1):
-            if not keeps_off(points[k], points[k + 1], points[other], points[other + 1], off):
+            need = max(needs[k], needs[k + 1]) + max(needs[other], needs[other + 1]) + scene.apart
+            if not keeps_off(points[k], points[k + 1], points[other], points[other + 1], need):
                 return False
     return True
 
@@ -171,19 +175,21 @@ def is_clear(points: FloatArray, n: int, scene: FedScene, need: float) -> bool:
 @njit(cache=True)
 def state_is_clear(state: FloatArray, scene: FedScene) -> bool:
     """Tell whether the arm keeps the margin."""
-    points = np.empty((state.shape[0] + 1, 2))
-    return is_clear(points, place_arm(state, scene, points), scene, scene.margin)
+    points, needs = np.empty((state.shape[0] + 1, 2)), np.full(state.shape[0] + 1, scene.margin)
+    return is_clear(points, place_arm(state, scene, points), scene, needs)
 
 
 @njit(cache=True)
-def _moved(before: FloatArray, n_before: int, after: FloatArray, n_after: int) -> float:
-    """Compute how far the joint moves that moves farthest; joints are counted from the tip."""
+def _moves(before: FloatArray, n_before: int, after: FloatArray, n_after: int, moves: FloatArray) -> float:
+    """Compute how far joints move, counted from the tip; raise `moves` to it, and return the most."""
     most = 0.0
-    for back in range(1, min(n_before, n_after) + 1):
-        x = after[n_after - back, 0] - before[n_before - back, 0]
-        y = after[n_after - back, 1] - before[n_before - back, 1]
-        most = max(most, x * x + y * y)
-    return float(np.sqrt(most))
+    for back in range(min(n_before, n_after)):
+        x = after[n_after - 1 - back, 0] - before[n_before - 1 - back, 0]
+        y = after[n_after - 1 - back, 1] - before[n_before - 1 - back, 1]
+        move = np.sqrt(x * x + y * y)
+        moves[back] = max(moves[back], move)
+        most = max(most, move)
+    return most
 
 
 @njit(cache=True)
@@ -194,43 +200,48 @@ def _between(a: FloatArray, b: FloatArray, share: float, state: FloatArray) -> N
 
 
 @njit(cache=True)
-def _levels(a: FloatArray, b: FloatArray, scene: FedScene) -> int:
-    """Estimate how often the edge from a to b must be halved for no joint to move more than a step."""
-    n_links, most = a.shape[0], 0.0
+def _steps(a: FloatArray, b: FloatArray, scene: FedScene) -> int:
+    """Estimate in how many steps the arm gets from a to b with no joint moving more than a step."""
+    n_links, way = a.shape[0], 0.0
     state, before, points = np.empty(n_links), np.empty((n_links + 1, 2)), np.empty((n_links + 1, 2))
-    n_before = place_arm(a, scene, before)
+    moves, n_before = np.empty(n_links + 1), place_arm(a, scene, before)
     for part in range(1, PARTS + 1):
         _between(a, b, part / PARTS, state)
         n = place_arm(state, scene, points)
-        most = max(most, _moved(before, n_before, points, n))
+        way += _moves(before, n_before, points, n, moves)
         before, points, n_before = points, before, n
-    levels = 0
-    while levels < MOST_LEVELS and PARTS * most > STEP * (1 << levels):
-        levels += 1
-    return levels
+    return max(int(np.ceil(way / STEP)), 1)
 
 
 @njit(cache=True)
-def _pose_shares(a: FloatArray, b: FloatArray, levels: int) -> FloatArray:
+def _pose_shares(a: FloatArray, b: FloatArray, steps: int) -> FloatArray:
     """Return at which shares of an edge there are poses: evenly, and where a joint passes the base."""
     first, last = min(a[0], b[0]), max(a[0], b[0])
     low, high = int(np.ceil(first)), int(np.floor(last))
-    n = (1 << levels) + 1
-    shares = np.empty(n + max(high - low + 1, 0))
-    for k in range(n):
-        shares[k] = k / (n - 1)
-    n_passing = 0
-    if first < last:
-        for whole in range(low, high + 1):
-            shares[n + n_passing] = (whole - a[0]) / (b[0] - a[0])
-            n_passing += 1
-    shares = np.sort(shares[: n + n_passing])
-    kept = 1
+    passing = high - low + 1 if first < last else 0
+    shares = np.empty(steps + 1 + passing)
+    for k in range(steps + 1):
+        shares[k] = k / steps
+    for k in range(passing):
+        shares[steps + 1 + k] = (low + k - a[0]) / (b[0] - a[0])
+    shares, kept = np.sort(shares), 1
     for k in range(1, len(shares)):
         if shares[k] > shares[kept - 1]:
             shares[kept] = shares[k]
             kept += 1
     return shares[:kept]
+
+
+@njit(cache=True)
+def _pose(a: FloatArray, b: FloatArray, share: float, release: float, pose: FloatArray) -> None:
+    """Fill in the pose at a share of an edge: the angles that the arm has there."""
+    n_links = a.shape[0]
+    _between(a, b, share, pose)
+    if abs(pose[0] - np.round(pose[0])) < WHOLE:
+        pose[0] = np.round(pose[0])
+    for joint in range(1, n_links):
+        limit = release * max(pose[0] - (n_links - joint), 0.0)
+        pose[joint] = min(max(pose[joint], -limit), limit)
 
 
 @njit(cache=True)
@@ -250,26 +261,21 @@ def edge_poses(a: FloatArray, b: FloatArray, scene: FedScene) -> FloatArray:
         From a to b: states whose angles are those that the arm has, so near to each other that no joint moves
         more than a step, and among them those at which a joint passes the base.
     """
-    n_links, levels = a.shape[0], _levels(a, b, scene)
-    before, points = np.empty((n_links + 1, 2)), np.empty((n_links + 1, 2))
+    n_links, steps = a.shape[0], _steps(a, b, scene)
+    before, points, moves = np.empty((n_links + 1, 2)), np.empty((n_links + 1, 2)), np.empty(n_links + 1)
     while True:
-        shares = _pose_shares(a, b, levels)
+        shares = _pose_shares(a, b, steps)
         poses, most, n_before = np.empty((len(shares), n_links)), 0.0, 0
         for k in range(len(shares)):
-            pose = poses[k]
-            _between(a, b, shares[k], pose)
-            if abs(pose[0] - np.round(pose[0])) < WHOLE:
-                pose[0] = np.round(pose[0])
-            for joint in range(1, n_links):
-                limit = scene.release * max(pose[0] - (n_links - joint), 0.0)
-                pose[joint] = min(max(pose[joint], -limit), limit)
-            n = place_arm(pose, scene, points)
+            _pose(a, b, shares[k], scene.release, poses[k])
+            n = place_arm(poses[k], scene, points)
             if k > 0:
-                most = max(most, max(_moved(before, n_before, points, n), abs(pose[0] - poses[k - 1, 0])))
+                most = max(most, abs(poses[k, 0] - poses[k - 1, 0]))  # of joints in the feeder
+                most = max(most, _moves(before, n_before, points, n, moves))
             before, points, n_before = points, before, n
-        if most <= STEP or levels == MOST_LEVELS:
+        if most <= STEP or steps > MOST_STEPS:
             return poses
-        levels += 1
+        steps = int(np.ceil(1.05 * steps * most / STEP))
 
 
 @njit(cache=True)
@@ -279,14 +285,16 @@ def _piece_is_clear(a: FloatArray, b: FloatArray, scene: FedScene) -> bool:
     No joint is farther from the line between its places at a piece's ends than an eighth of the sum of the
     squares of what the headings behind it change by.
     """
-    n_links, turn, bend = a.shape[0], 0.0, 0.0
+    n_links = a.shape[0]
+    bends, turn = np.zeros(n_links + 1), 0.0  # counted from the tip
     for joint in range(1, n_links):
         turn += b[joint] - a[joint]
-        bend += turn * turn / 8.0
-    state, points = np.empty(n_links), np.empty((3, n_links + 1, 2))
-    n, stack = np.empty(3, dtype=np.int64), np.empty((MOST_LEVELS + 2, 2))
+        for back in range(n_links - joint):
+            bends[back] += turn * turn / 8.0
+    state, moves, needs = np.empty(n_links), np.empty(n_links + 1), np.empty(n_links + 1)
+    points, n = np.empty((3, n_links + 1, 2)), np.empty(3, dtype=np.int64)
+    stack, height = np.empty((MOST_HALVINGS + 2, 2)), 1
     stack[0, 0], stack[0, 1] = 0.0, 1.0
-    height = 1
     while height > 0:
         height -= 1
         start, end = stack[height, 0], stack[height, 1]
@@ -294,14 +302,18 @@ def _piece_is_clear(a: FloatArray, b: FloatArray, scene: FedScene) -> bool:
         for k, share in enumerate((start, middle, end)):
             _between(a, b, share, state)
             n[k] = place_arm(state, scene, points[k])
-        moved = max(
-            _moved(points[0], n[0], points[1], n[1]), _moved(points[1], n[1], points[2], n[2])
-        ) + bend * (end - start) * (end - start)
-        if is_clear(points[1], n[1], scene, max(moved, scene.margin)):
+        moves[:] = 0.0
+        _moves(points[0], n[0], points[1], n[1], moves)
+        _moves(points[2], n[2], points[1], n[1], moves)
+        most = 0.0
+        for k in range(n[1]):
+            back = n[1] - 1 - k
+            move = moves[back] + bends[back] * (end - start) * (end - start)
+            needs[k], most = max(move, scene.margin), max(most, move)
+        if is_clear(points[1], n[1], scene, needs):
             continue
-        if moved <= scene.margin or height + 2 > len(stack):
-            return False
-        if not is_clear(points[1], n[1], scene, scene.margin):
+        needs[:] = scene.margin
+        if most <= scene.margin or height + 2 > len(stack) or not is_clear(points[1], n[1], scene, needs):
             return False
         stack[height, 0], stack[height, 1] = middle, end
         stack[height + 1, 0], stack[height + 1, 1] = start, middle
@@ -322,7 +334,7 @@ def edge_is_clear(a: FloatArray, b: FloatArray, scene: FedScene) -> bool:
     """
     if not state_is_clear(b, scene):
         return False
-    poses = edge_poses(a, b, scene)
+    poses, needs = edge_poses(a, b, scene), np.full(a.shape[0] + 1, scene.margin)
     last, points = len(poses) - 1, np.empty((a.shape[0] + 1, 2))
     stride = 1
     while stride < last:
@@ -330,7 +342,7 @@ def edge_is_clear(a: FloatArray, b: FloatArray, scene: FedScene) -> bool:
     while stride > 1:  # coarse to fine, for what is not free shows soon
         half = stride // 2
         for k in range(half, last, stride):
-            if not is_clear(points, place_arm(poses[k], scene, points), scene, scene.margin):
+            if not is_clear(points, place_arm(poses[k], scene, points), scene, needs):
                 return False
         stride = half
     for k in range(last):

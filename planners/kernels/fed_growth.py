@@ -35,6 +35,8 @@ class Chains(NamedTuple):
         The farthest guide point that each sees.
     to_go : array, shape (n,)
         Way to the goal by that guide point.
+    bent : array, shape (n,)
+        Sum of the squares of the angles up to there.
     """
 
     places: FloatArray
@@ -43,6 +45,7 @@ class Chains(NamedTuple):
     parents: IntArray
     guides: IntArray
     to_go: FloatArray
+    bent: FloatArray
 
 
 class Guide(NamedTuple):
@@ -211,8 +214,8 @@ def grow(
     size = joints.shape[0] * MOST
     places, headings, angles = np.empty((size, 2)), np.empty(size), np.empty(size)
     parents, guides = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int64)
-    to_go, tried, n = np.empty(size), np.empty(MOST), 0
-    tip = np.empty(2)
+    to_go, bent = np.empty(size), np.empty(size)
+    tried, tip, n = np.empty(MOST), np.empty(2), 0
     for row in range(joints.shape[0]):
         joint = joints[row]
         place, heading, most = chains.places[joint], chains.headings[joint], most_bent
@@ -235,6 +238,6 @@ def grow(
                 continue
             places[n, 0], places[n, 1] = tip[0], tip[1]
             headings[n], angles[n], parents[n] = heading + tried[k], tried[k], joint
-            guides[n], to_go[n] = seen, rest
+            guides[n], to_go[n], bent[n] = seen, rest, chains.bent[joint] + tried[k] ** 2
             n += 1
-    return Chains(places[:n], headings[:n], angles[:n], parents[:n], guides[:n], to_go[:n])
+    return Chains(places[:n], headings[:n], angles[:n], parents[:n], guides[:n], to_go[:n], bent[:n])
