@@ -61,6 +61,10 @@ class FedArm:
         """Tell whether the arm keeps off walls and itself at b and all the way from a, where it does, to b."""
         return bool(kernel.edge_is_clear(a, b, self.scene))
 
+    def room(self, state: FloatArray, moves: FloatArray) -> int:
+        """Count the moves, shape (n_moves, n_links), after which the arm keeps off walls and itself."""
+        return int(kernel.room_around(state, moves, self.scene))
+
     def tip(self, state: FloatArray) -> FloatArray:
         """Return where the tip is, shape (2,), in maze units."""
         points = np.empty((len(state) + 1, 2))

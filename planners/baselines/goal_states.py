@@ -27,8 +27,11 @@ PROGRESS = 0.05
 SHARE_OF_RADIUS = 0.9
 """Of the goal radius, within which tips end."""
 
-POOL = 4
-"""Goal states are chosen from the straightest, so many times as many as are wanted."""
+POOL = 200
+"""Arms at the goal of which the best are chosen, at most."""
+
+MOVES, MOVE = 100, 0.1
+"""A goal state is the better the more random moves of this length, in rad and link lengths, it leaves free."""
 
 CELL, TURN = 0.15, 0.3
 """Of chains that end within so many link lengths and rad of each other, one is kept."""
@@ -75,11 +78,10 @@ def grown_goal_states(
     joints = np.arange(1, len(chains.places))
     while len(joints):
         there = joints[np.hypot(*(chains.places[joints] - guide.points[-1]).T) <= guide.radius]
-        there = there[np.argsort(chains.bent[there])]
-        states = [_state(chains, int(joint)) for joint in there[: POOL * number]]
+        states = [_state(chains, int(joint)) for joint in rng.permutation(there)[:POOL]]
         states = [state for state in states if arm.is_clear(state)]
         if states:
-            return _spread(states, number), _points(chains, int(there[0])) * arm.link_length
+            return _roomiest(arm, states, number, rng), _points(chains, int(there[0])) * arm.link_length
         if time.perf_counter() > deadline:
             break
         chosen = _chosen(chains, joints, rng)
@@ -133,11 +135,11 @@ def _state(chains: Chains, joint: int) -> FloatArray:
     return np.concatenate([[len(way) - 2 + out], chains.angles[way[2:]]])
 
 
-def _spread(states: list[FloatArray], number: int) -> list[FloatArray]:
-    """Choose states that are far from each other, one after the other."""
-    kept, every = [states[0]], np.array(states)
-    away = np.full(len(states), np.inf)
-    while len(kept) < min(number, len(states)):
-        away = np.minimum(away, np.linalg.norm(every - kept[-1], axis=1))
-        kept.append(states[int(np.argmax(away))])
-    return kept
+def _roomiest(
+    arm: FedArm, states: list[FloatArray], number: int, rng: np.random.Generator
+) -> list[FloatArray]:
+    """Choose the states around which the arm is free in most directions."""
+    moves = rng.normal(size=(MOVES, len(states[0])))
+    moves *= MOVE / np.linalg.norm(moves, axis=1, keepdims=True)
+    rooms = [arm.room(state, moves) for state in states]
+    return [states[k] for k in np.argsort(rooms)[::-1][:number]]

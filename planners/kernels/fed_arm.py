@@ -180,6 +180,17 @@ def state_is_clear(state: FloatArray, scene: FedScene) -> bool:
 
 
 @njit(cache=True)
+def room_around(state: FloatArray, moves: FloatArray, scene: FedScene) -> int:
+    """Count the moves, shape (n_moves, n_links), after which the arm keeps the margin."""
+    count = 0
+    for row in range(len(moves)):
+        moved = state + moves[row]
+        moved[0] = min(max(moved[0], 0.0), state.shape[0])
+        count += state_is_clear(moved, scene)
+    return count
+
+
+@njit(cache=True)
 def _moves(before: FloatArray, n_before: int, after: FloatArray, n_after: int, moves: FloatArray) -> float:
     """Compute how far joints move, counted from the tip; raise `moves` to it, and return the most."""
     most = 0.0
