@@ -18,10 +18,10 @@ SPACING = 0.1
 ROOTS = 24
 """Ways that the first link is out of the feeder, that are tried."""
 
-BEAM = 600
+BEAM = 200
 """Chains that are grown on from: half of them those that got farthest, half drawn."""
 
-PROGRESS = 0.05
+PROGRESS = 0.1
 """How much nearer to the goal each link leads, in link lengths."""
 
 SHARE_OF_RADIUS = 0.9
@@ -113,7 +113,9 @@ def _chosen(chains: Chains, joints: IntArray, rng: np.random.Generator) -> IntAr
     if len(joints) <= BEAM:
         return joints
     order = np.argsort(chains.to_go[joints])
-    return np.concatenate([joints[order[: BEAM // 2]], rng.permutation(joints[order[BEAM // 2 :]])[: BEAM // 2]])
+    return np.concatenate(
+        [joints[order[: BEAM // 2]], rng.permutation(joints[order[BEAM // 2 :]])[: BEAM // 2]]
+    )
 
 
 def _way(chains: Chains, joint: int) -> list[int]:

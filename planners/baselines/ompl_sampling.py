@@ -47,7 +47,7 @@ states; the first two want a projection."""
 TIME_LIMIT = 60.0
 """Seconds that planning may take, if the query's deadline is not earlier."""
 
-RANGE = 0.3
+RANGE = 0.25
 """Longest edge, in rad and link lengths. The default, a fifth of the extent, solves next to nothing here."""
 
 CELL = 0.25
@@ -156,7 +156,9 @@ def _plan(query: Query, algorithm: str, deadline: float) -> Candidate:
             clock.append(time.perf_counter())
             motion = arm.motion(path)
             clock.append(time.perf_counter())
-        timings.update(dict(zip(("grow", "plan", "shortcut", "poses"), np.diff(clock).tolist(), strict=False)))
+        timings.update(
+            dict(zip(("grow", "plan", "shortcut", "poses"), np.diff(clock).tolist(), strict=False))
+        )
         if path is None:
             return Candidate(
                 status=PlanningStatus.OUT_OF_TIME,

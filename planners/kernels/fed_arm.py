@@ -133,7 +133,10 @@ def keeps_off(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, need: 
         return True
     if _meet(a, b, c, d):
         return False
-    least = min(min(squared_distance(a, c, d), squared_distance(b, c, d)), min(squared_distance(c, a, b), squared_distance(d, a, b)))
+    least = min(
+        min(squared_distance(a, c, d), squared_distance(b, c, d)),
+        min(squared_distance(c, a, b), squared_distance(d, a, b)),
+    )
     return least >= need * need
 
 

@@ -16,6 +16,9 @@ INSET = 0.01
 STRATUM = 0.2
 """One direction is drawn from about every so many rad of a free range."""
 
+REACH = 1.01
+"""How far walls are looked for: a link and its margin."""
+
 MOST = 64
 """Directions that are tried at a joint, at most."""
 
@@ -132,13 +135,31 @@ def link_is_free(a: FloatArray, b: FloatArray, walls: FloatArray, need: float) -
 
 
 @njit(cache=True)
-def farthest_seen(place: FloatArray, after: int, guide: Guide, walls: FloatArray) -> int:
-    """Return the farthest guide point ahead that is seen from a place; -1 if none is.
+def _walls_about(points: FloatArray, walls: FloatArray) -> FloatArray:
+    """Return the walls whose boxes meet that of some points: all that segments between these may meet."""
+    near, n = np.empty_like(walls), 0
+    x0, x1 = points[:, 0].min(), points[:, 0].max()
+    y0, y1 = points[:, 1].min(), points[:, 1].max()
+    for wall in range(walls.shape[0]):
+        (ax, ay), (bx, by) = walls[wall, 0], walls[wall, 1]
+        if max(ax, bx) >= x0 and min(ax, bx) <= x1 and max(ay, by) >= y0 and min(ay, by) <= y1:
+            near[n] = walls[wall]
+            n += 1
+    return near[:n]
 
-    Guide points are looked for up to two link lengths ahead of the number `after`, and one behind it.
-    """
-    ahead = min(after + int(2.0 / guide.spacing) + 1, guide.points.shape[0] - 1)
-    for k in range(ahead, max(after - int(1.0 / guide.spacing), 0) - 1, -1):
+
+@njit(cache=True)
+def _window(after: int, guide: Guide) -> tuple[int, int]:
+    """Return the first and the last guide point that a link after the one that sees `after` may see."""
+    steps = int(1.0 / guide.spacing)
+    return max(after - steps, 0), min(after + 2 * steps + 1, guide.points.shape[0] - 1)
+
+
+@njit(cache=True)
+def farthest_seen(place: FloatArray, after: int, guide: Guide, walls: FloatArray) -> int:
+    """Return the farthest guide point that is seen from a place, up to two link lengths after one; -1 if none is."""
+    first, last = _window(after, guide)
+    for k in range(last, first - 1, -1):
         if link_is_free(place, guide.points[k], walls, 0.0):
             return k
     return -1
@@ -222,12 +243,16 @@ def grow(
         if chains.parents[joint] == 0:  # it is just out of the feeder
             way = np.hypot(place[0] - scene.base_pose[0], place[1] - scene.base_pose[1])
             most = min(most, scene.release * way)
-        for k in range(_directions(place, heading, most, guide, scene.walls, draws[row], tried)):
+        reach = np.array([[place[0] - REACH, place[1] - REACH], [place[0] + REACH, place[1] + REACH]])
+        near = _walls_about(reach, scene.walls)
+        first, last = _window(chains.guides[joint], guide)
+        about = _walls_about(np.concatenate((reach, guide.points[first : last + 1])), scene.walls)
+        for k in range(_directions(place, heading, most, guide, near, draws[row], tried)):
             tip[0] = place[0] + np.cos(heading + tried[k])
             tip[1] = place[1] + np.sin(heading + tried[k])
-            if not link_is_free(place, tip, scene.walls, 2.0 * scene.margin):
+            if not link_is_free(place, tip, near, 2.0 * scene.margin):
                 continue
-            seen = farthest_seen(tip, chains.guides[joint], guide, scene.walls)
+            seen = farthest_seen(tip, chains.guides[joint], guide, about)
             if seen < 0:
                 continue
             rest = guide.spacing * (guide.points.shape[0] - 1 - seen)
