@@ -25,7 +25,7 @@ MAZE = Maze.from_corridors([(0, 0), (0, 600), (240, 600), (240, 300)], 200.0)
 LENGTH = 220.0
 ARM = fed_arm(MAZE, LENGTH, 0.0, None)
 STATES = st.tuples(st.floats(0.0, 4.0), *[st.floats(-3.0, 3.0)] * 3).map(np.array)
-LIGHT = settings(max_examples=30)
+LIGHT = settings(max_examples=20)
 
 
 def guide_in(maze, link_length, link_radius=0.0):
@@ -58,6 +58,7 @@ def walk(rng, steps=12):
     return np.array(path)
 
 
+@LIGHT
 @given(STATES)
 def test_a_state_places_the_arm_as_the_environment_does(state):
     motion = ARM.motion(np.array([state, state]))
@@ -67,6 +68,7 @@ def test_a_state_places_the_arm_as_the_environment_does(state):
     assert (motion.joint_angles[-1][past <= 0.0] == 0.0).all()
 
 
+@LIGHT
 @given(STATES)
 def test_a_state_is_clear_when_the_arm_keeps_its_margin_and_does_not_meet_itself(state):
     motion = ARM.motion(np.array([state, state]))
@@ -80,6 +82,7 @@ def test_a_state_is_clear_when_the_arm_keeps_its_margin_and_does_not_meet_itself
         assert min(pairs) < 3.0 * MARGIN * LENGTH
 
 
+@LIGHT
 @given(STATES, STATES)
 def test_an_edge_keeps_the_checkers_step_limit_and_the_feeders_rule(a, b):
     report = validate(ARM.motion(np.array([np.zeros(4), a, b])), MAZE)
@@ -103,7 +106,9 @@ def test_an_edge_that_is_said_to_be_clear_is_so_at_many_places(seed):
     for share in (0.0, 0.25, 0.5, 0.75):  # between poses feed and angles change linearly
         feed = motion.feed[:-1] + share * np.diff(motion.feed)
         angles = motion.joint_angles[:-1] + share * np.diff(motion.joint_angles, axis=0)
-        for f, joints in zip(feed, joints_from_configuration(feed, angles, LENGTH, MAZE.base_pose), strict=True):
+        for f, joints in zip(
+            feed, joints_from_configuration(feed, angles, LENGTH, MAZE.base_pose), strict=True
+        ):
             line = in_front(joints, f, LENGTH, MAZE.base_pose[:2])
             assert line.within(MAZE.free_space) and line.is_simple
 
@@ -116,7 +121,8 @@ def test_an_edge_that_keeps_well_off_everything_is_clear(seed):
     b = a + rng.normal(scale=0.1, size=4)
     motion = ARM.motion(np.array([a, b]))
     lines = [
-        in_front(joints, feed, LENGTH, MAZE.base_pose[:2]) for joints, feed in zip(motion.joints, motion.feed, strict=True)
+        in_front(joints, feed, LENGTH, MAZE.base_pose[:2])
+        for joints, feed in zip(motion.joints, motion.feed, strict=True)
     ]
     front = [LineString(line.coords[1:]) for line in lines]  # the base is near the wall behind it
     off = min(line.distance(MAZE.free_space.boundary) for line in front)
@@ -145,7 +151,7 @@ def test_free_directions_are_those_in_which_a_link_meets_no_wall(x, y, heading):
     ranges = free_directions(place, heading, 3.0, walls)
     lines = MultiLineString([list(map(tuple, wall)) for wall in walls])
     for angle in np.linspace(-3.0, 3.0, 121):
-        tip = place + (math.cos(heading + angle), math.sin(heading + angle))
+        tip = place + np.array([math.cos(heading + angle), math.sin(heading + angle)])
         ends = np.abs(ranges - angle)
         if ends.size and ends.min() < 1e-6:
             continue  # an end may be read either way
@@ -153,7 +159,7 @@ def test_free_directions_are_those_in_which_a_link_meets_no_wall(x, y, heading):
         assert free == any(low <= angle <= high for low, high in ranges)
 
 
-@pytest.mark.parametrize("length", [120.0, 220.0, 300.0, 400.0])
+@pytest.mark.parametrize("length", [120.0, 220.0, 300.0])
 def test_grown_arms_are_free_at_the_goal_and_out_of_the_feeder_as_its_rule_says(length):
     arm = fed_arm(MAZE, length, 0.0, None)
     states = goal_states(arm)
@@ -192,8 +198,8 @@ def test_grown_thick_arms_keep_off_themselves_and_the_walls():
         assert out.distance(MAZE.free_space.boundary) >= 15.0
 
 
-def test_links_that_no_chain_of_them_gets_past_a_bend_with_grow_to_no_goal():
-    sharp = Maze.from_corridors([(0, 0), (0, 600), (300, 600)], 60.0)
+def test_links_too_long_to_stand_between_two_bends_do_not_grow_to_the_goal():
+    sharp = Maze.from_corridors([(0, 0), (0, 600), (150, 600), (150, 1000)], 60.0)
     arm = fed_arm(sharp, 250.0, 0.0, None)
     states, farthest = grown_goal_states(arm, guide_in(sharp, 250.0), 4, np.random.default_rng(0))
     assert states == []

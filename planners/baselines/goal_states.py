@@ -18,6 +18,9 @@ SPACING = 0.1
 ROOTS = 24
 """Ways that the first link is out of the feeder, that are tried."""
 
+NEARLY_OUT = 0.999
+"""The most of them, in link lengths: chains from there reach farthest."""
+
 BEAM = 200
 """Chains that are grown on from: half of them those that got farthest, half drawn."""
 
@@ -96,6 +99,7 @@ def _roots(arm: FedArm, guide: Guide, rng: np.random.Generator) -> Chains:
     """Return the base, and joints that the feeder has pushed past it."""
     x, y, heading = arm.scene.base_pose
     ways = np.concatenate([[0.0], (np.arange(ROOTS) + 1.0 - rng.random(ROOTS)) / ROOTS])
+    ways[-1] = NEARLY_OUT
     places = np.column_stack([x + ways * np.cos(heading), y + ways * np.sin(heading)])
     seen = np.array([farthest_seen(place, 0, guide, arm.scene.walls) for place in places])
     rest = guide.spacing * (len(guide.points) - 1 - seen) + np.hypot(*(places - guide.points[seen]).T)
@@ -106,7 +110,7 @@ def _roots(arm: FedArm, guide: Guide, rng: np.random.Generator) -> Chains:
 
 def _chosen(chains: Chains, joints: IntArray, rng: np.random.Generator) -> IntArray:
     """Choose from which joints to grow on: one of each cell, and not too many."""
-    joints = joints[np.argsort(chains.bent[joints])]
+    joints = joints[np.lexsort((chains.to_go[joints], chains.bent[joints]))]
     cells = np.column_stack([chains.places[joints] / CELL, chains.headings[joints] / TURN])
     _, first = np.unique(np.floor(cells).astype(np.int64), axis=0, return_index=True)
     joints = joints[np.sort(first)]

@@ -22,13 +22,13 @@ from numba import njit
 from planners.kernels.types import FloatArray
 
 PARTS = 8
-"""By how many parts of an edge it is first judged how far joints move along it."""
+"""An edge has at least so many pieces."""
 
 MOST_HALVINGS = 12
-"""A piece between poses is halved at most this often."""
+"""A piece of an edge is halved at most this often for its poses, and one between poses for the check."""
 
-MOST_STEPS = 4096
-"""Poses of an edge are not tried closer than that."""
+SHORTEST = 1e-5
+"""Poses of an edge are not tried closer than that, as a share of it."""
 
 STEP = 0.045
 """How far a joint may move between poses: nine tenths of what the checker allows."""
@@ -214,36 +214,17 @@ def _between(a: FloatArray, b: FloatArray, share: float, state: FloatArray) -> N
 
 
 @njit(cache=True)
-def _steps(a: FloatArray, b: FloatArray, scene: FedScene) -> int:
-    """Estimate in how many steps the arm gets from a to b with no joint moving more than a step."""
-    n_links, way = a.shape[0], 0.0
-    state, before, points = np.empty(n_links), np.empty((n_links + 1, 2)), np.empty((n_links + 1, 2))
-    moves, n_before = np.empty(n_links + 1), place_arm(a, scene, before)
-    for part in range(1, PARTS + 1):
-        _between(a, b, part / PARTS, state)
-        n = place_arm(state, scene, points)
-        way += _moves(before, n_before, points, n, moves)
-        before, points, n_before = points, before, n
-    return max(int(np.ceil(way / STEP)), 1)
-
-
-@njit(cache=True)
-def _pose_shares(a: FloatArray, b: FloatArray, steps: int) -> FloatArray:
-    """Return at which shares of an edge there are poses: evenly, and where a joint passes the base."""
+def _first_shares(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return at which shares of an edge there are poses in any case: evenly, and where a joint passes the base."""
     first, last = min(a[0], b[0]), max(a[0], b[0])
     low, high = int(np.ceil(first)), int(np.floor(last))
     passing = high - low + 1 if first < last else 0
-    shares = np.empty(steps + 1 + passing)
-    for k in range(steps + 1):
-        shares[k] = k / steps
+    shares = np.empty(PARTS + 1 + passing)
+    for k in range(PARTS + 1):
+        shares[k] = k / PARTS
     for k in range(passing):
-        shares[steps + 1 + k] = (low + k - a[0]) / (b[0] - a[0])
-    shares, kept = np.sort(shares), 1
-    for k in range(1, len(shares)):
-        if shares[k] > shares[kept - 1]:
-            shares[kept] = shares[k]
-            kept += 1
-    return shares[:kept]
+        shares[PARTS + 1 + k] = (low + k - a[0]) / (b[0] - a[0])
+    return np.sort(shares)
 
 
 @njit(cache=True)
@@ -260,7 +241,7 @@ def _pose(a: FloatArray, b: FloatArray, share: float, release: float, pose: Floa
 
 @njit(cache=True)
 def edge_poses(a: FloatArray, b: FloatArray, scene: FedScene) -> FloatArray:
-    """Compute the poses along an edge.
+    """Compute the poses along an edge; the other way round they are the same.
 
     Parameters
     ----------
@@ -275,21 +256,40 @@ def edge_poses(a: FloatArray, b: FloatArray, scene: FedScene) -> FloatArray:
         From a to b: states whose angles are those that the arm has, so near to each other that no joint moves
         more than a step, and among them those at which a joint passes the base.
     """
-    n_links, steps = a.shape[0], _steps(a, b, scene)
+    k, n_links = 0, a.shape[0]
+    while k < n_links - 1 and a[k] == b[k]:
+        k += 1
+    if a[k] > b[k]:
+        return edge_poses_onward(b, a, scene)[::-1].copy()
+    return edge_poses_onward(a, b, scene)
+
+
+@njit(cache=True)
+def edge_poses_onward(a: FloatArray, b: FloatArray, scene: FedScene) -> FloatArray:
+    """Compute the poses along an edge, see `edge_poses`, by halving what is too far between two of them."""
+    n_links, todo = a.shape[0], _first_shares(a, b)[::-1]
+    stack, height = np.empty(len(todo) + MOST_HALVINGS), len(todo) - 1
+    stack[:height] = todo[:height]
+    poses, n_poses, share = np.empty((64, n_links)), 1, 0.0
     before, points, moves = np.empty((n_links + 1, 2)), np.empty((n_links + 1, 2)), np.empty(n_links + 1)
-    while True:
-        shares = _pose_shares(a, b, steps)
-        poses, most, n_before = np.empty((len(shares), n_links)), 0.0, 0
-        for k in range(len(shares)):
-            _pose(a, b, shares[k], scene.release, poses[k])
-            n = place_arm(poses[k], scene, points)
-            if k > 0:
-                most = max(most, abs(poses[k, 0] - poses[k - 1, 0]))  # of joints in the feeder
-                most = max(most, _moves(before, n_before, points, n, moves))
+    _pose(a, b, 0.0, scene.release, poses[0])
+    n_before = place_arm(poses[0], scene, before)
+    while height > 0:
+        if n_poses == len(poses):
+            poses = np.concatenate((poses, np.empty_like(poses)))
+        pose, end = poses[n_poses], stack[height - 1]
+        _pose(a, b, end, scene.release, pose)
+        n = place_arm(pose, scene, points)
+        moved = max(_moves(before, n_before, points, n, moves), abs(pose[0] - poses[n_poses - 1, 0]))
+        if moved > STEP and height < len(stack) and end - share > SHORTEST:
+            stack[height] = 0.5 * (share + end)
+            height += 1
+            continue
+        height -= 1
+        if end > share:
             before, points, n_before = points, before, n
-        if most <= STEP or steps > MOST_STEPS:
-            return poses
-        steps = int(np.ceil(1.05 * steps * most / STEP))
+            n_poses, share = n_poses + 1, end
+    return poses[:n_poses].copy()
 
 
 @njit(cache=True)

@@ -167,18 +167,17 @@ def farthest_seen(place: FloatArray, after: int, guide: Guide, walls: FloatArray
 
 @njit(cache=True)
 def _directions(
-    place: FloatArray, heading: float, most: float, guide: Guide, walls: FloatArray, draws: FloatArray,
+    place: FloatArray, heading: float, most: float, ahead: FloatArray, walls: FloatArray, draws: FloatArray,
     angles: FloatArray,
 ) -> int:  # fmt: skip
-    """Fill in the angles to try at a joint: of each free range the ends, drawn ones, and that to the goal."""
+    """Fill in the angles to try at a joint: of each free range the ends and drawn ones, and that to a point."""
     n, n_drawn = 0, 0
-    to_x, to_y = guide.points[-1, 0] - place[0], guide.points[-1, 1] - place[1]
-    aim = (np.arctan2(to_y, to_x) - heading + np.pi) % (2.0 * np.pi) - np.pi
-    aims = abs(np.hypot(to_x, to_y) - 1.0) < guide.radius
+    aim = np.arctan2(ahead[1] - place[1], ahead[0] - place[0]) - heading
+    aim = (aim + np.pi) % (2.0 * np.pi) - np.pi
     for low, high in free_directions(place, heading, most, walls):
         inset = min(INSET, (high - low) / 3.0)
         low, high = low + inset, high - inset
-        if aims and low <= aim <= high and n < MOST:
+        if low <= aim <= high and n < MOST:
             angles[n] = aim
             n += 1
         strata = int(np.ceil((high - low) / STRATUM))
@@ -247,7 +246,8 @@ def grow(
         near = _walls_about(reach, scene.walls)
         first, last = _window(chains.guides[joint], guide)
         about = _walls_about(np.concatenate((reach, guide.points[first : last + 1])), scene.walls)
-        for k in range(_directions(place, heading, most, guide, near, draws[row], tried)):
+        ahead = guide.points[chains.guides[joint]]  # the goal, once it is seen
+        for k in range(_directions(place, heading, most, ahead, near, draws[row], tried)):
             tip[0] = place[0] + np.cos(heading + tried[k])
             tip[1] = place[1] + np.sin(heading + tried[k])
             if not link_is_free(place, tip, near, 2.0 * scene.margin):
