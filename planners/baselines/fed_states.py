@@ -58,7 +58,7 @@ class FedArm:
         return bool(kernel.state_is_clear(state, self.scene))
 
     def edge_is_clear(self, a: FloatArray, b: FloatArray) -> bool:
-        """Tell whether the arm keeps off walls and itself at b and all the way from a, where it does, to b."""
+        """Tell whether the arm keeps off walls and itself all the way from a, where it does, to b."""
         return bool(kernel.edge_is_clear(a, b, self.scene))
 
     def room(self, state: FloatArray, moves: FloatArray) -> int:
@@ -71,7 +71,7 @@ class FedArm:
         return np.asarray(self.link_length * points[kernel.place_arm(state, self.scene, points) - 1])
 
     def shortened(self, path: FloatArray, rng: np.random.Generator, seconds: float) -> FloatArray:
-        """Return a path of states, shape (n, n_links), with shortcuts; there is a look at the clock now and then."""
+        """Return a path of states, shape (n, n_links), with shortcuts; `seconds` bounds the time roughly."""
         late = time.perf_counter() + seconds
         for _ in range(BATCHES):
             if len(path) < 3 or time.perf_counter() > late:

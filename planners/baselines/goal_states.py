@@ -10,7 +10,7 @@ from planners.baselines.fed_states import FedArm
 from planners.kernels.fed_growth import MOST, Chains, Guide, farthest_seen, grow
 from planners.kernels.types import FloatArray, IntArray
 
-__all__ = ["guide_along", "grown_goal_states"]
+__all__ = ["grown_goal_states", "guide_along"]
 
 SPACING = 0.1
 """Of guide points, in link lengths."""
