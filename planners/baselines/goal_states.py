@@ -34,7 +34,7 @@ POOL = 200
 """Arms at the goal of which the best are chosen, at most."""
 
 MOVES, MOVE = 100, 0.1
-"""A goal state is the better the more random moves of this length, in rad and link lengths, it leaves free."""
+"""The best goal states leave most random moves of this length, in rad and link lengths, free."""
 
 CELL, TURN = 0.15, 0.3
 """Of chains that end within so many link lengths and rad of each other, one is kept."""

@@ -1,8 +1,8 @@
 """Sampling-based planners of the Open Motion Planning Library (OMPL) on a fed arm.
 
 Everything that is not their business is made as easy for them as we could: states are such that none is lost
-to the feeder, states and edges are checked by compiled kernels, whole arms at the goal are grown for them, and
-what they find is shortened. Nothing is taken from our own motions.
+to the feeder, states and edges are checked by compiled kernels, whole arms at the goal are grown for them,
+and what they find is shortened. Nothing is taken from our own motions.
 
 References
 ----------
@@ -21,7 +21,6 @@ import importlib
 import importlib.util
 import math
 import time
-from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -58,6 +57,9 @@ GOAL_STATES = 16
 
 FINER = 4.0
 """By how much more links keep off the walls after the exact checker has refused a motion."""
+
+PATIENCE = 2.0
+"""Seconds that a planner gets with goal states once grown. Then others are grown, for twice as long."""
 
 SHORTENING = 0.2
 """Seconds for which a path is shortened, at most; and no longer than it was searched."""
@@ -138,8 +140,8 @@ def _plan(query: Query, algorithm: str, deadline: float) -> Candidate:
     if geometry is None:
         return query.no_path()
     guide = guide_along(geometry.path.points, query.maze.goal, query.maze.goal_radius, length)
-    rng, timings, margin = np.random.default_rng(query.seed), Counter(geometry.timings), MARGIN
-    start, reason = time.perf_counter(), "OMPL's {} found no way in {:.3g} s."
+    rng, timings, margin = np.random.default_rng(query.seed), dict(geometry.timings), MARGIN
+    start, patience, reason = time.perf_counter(), PATIENCE, "OMPL's {} found no way in {:.3g} s."
     query.tell("plan", 0.1)
     while True:
         clock = [time.perf_counter()]
@@ -147,18 +149,19 @@ def _plan(query: Query, algorithm: str, deadline: float) -> Candidate:
         goals, farthest = grown_goal_states(arm, guide, GOAL_STATES, rng, deadline)
         clock.append(time.perf_counter())
         if not goals:
-            timings["grow"] += clock[1] - clock[0]
+            _count(timings, clock)
             return _no_goal_states(farthest, clock[-1] > deadline, timings)
-        path = _path(arm, goals, algorithm, query, deadline - clock[-1])
+        path = _path(arm, goals, algorithm, query, min(patience, deadline - clock[-1]), rng)
         clock.append(time.perf_counter())
         if path is not None:
             path = arm.shortened(path, rng, min(SHORTENING, clock[2] - clock[1], deadline - clock[2]))
             clock.append(time.perf_counter())
             motion = arm.motion(path)
             clock.append(time.perf_counter())
-        timings.update(
-            dict(zip(("grow", "plan", "shortcut", "poses"), np.diff(clock).tolist(), strict=False))
-        )
+        _count(timings, clock)
+        if path is None and clock[-1] < deadline:
+            patience *= 2.0  # other goal states, perhaps of another number of links, may be nearer
+            continue
         if path is None:
             return Candidate(
                 status=PlanningStatus.OUT_OF_TIME,
@@ -173,7 +176,13 @@ def _plan(query: Query, algorithm: str, deadline: float) -> Candidate:
         reason = "OMPL's {} found no way in {:.3g} s that the exact check agrees with."
 
 
-def _no_goal_states(farthest: FloatArray, late: bool, timings: Counter[str]) -> Candidate:
+def _count(timings: dict[str, float], clock: list[float]) -> None:
+    """Add what the stages of a try have taken."""
+    for stage, seconds in zip(("grow", "plan", "shortcut", "poses"), np.diff(clock).tolist(), strict=False):
+        timings[stage] = timings.get(stage, 0.0) + seconds
+
+
+def _no_goal_states(farthest: FloatArray, late: bool, timings: dict[str, float]) -> Candidate:
     """Say that no whole arm at the goal could be grown."""
     x, y = (float(value) for value in farthest[-1])
     return Candidate(
@@ -186,13 +195,18 @@ def _no_goal_states(farthest: FloatArray, late: bool, timings: Counter[str]) -> 
 
 
 def _path(
-    arm: FedArm, goals: list[FloatArray], algorithm: str, query: Query, seconds: float
+    arm: FedArm,
+    goals: list[FloatArray],
+    algorithm: str,
+    query: Query,
+    seconds: float,
+    rng: np.random.Generator,
 ) -> FloatArray | None:
     """Return the states of the path that a planner of OMPL finds, shape (n, n_links), or None."""
     from ompl import base, geometric, util
 
     util.setLogLevel(util.LogLevel.LOG_NONE)  # it complains of every seed but the first
-    util.RNG.setSeed(query.seed % (2**31 - 1) + 1)
+    util.RNG.setSeed(int(rng.integers(1, 2**31)))
     n_links = len(goals[0])
     space = base.RealVectorStateSpace(n_links)
     bounds = base.RealVectorBounds(n_links)

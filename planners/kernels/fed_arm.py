@@ -121,7 +121,7 @@ def squared_distance(p: FloatArray, a: FloatArray, b: FloatArray) -> float:
     squared = along_x * along_x + along_y * along_y
     share = 0.0 if squared == 0.0 else min(max((x * along_x + y * along_y) / squared, 0.0), 1.0)
     x, y = x - share * along_x, y - share * along_y
-    return x * x + y * y
+    return float(x * x + y * y)
 
 
 @njit(cache=True)
@@ -137,7 +137,7 @@ def keeps_off(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, need: 
         min(squared_distance(a, c, d), squared_distance(b, c, d)),
         min(squared_distance(c, a, b), squared_distance(d, a, b)),
     )
-    return least >= need * need
+    return bool(least >= need * need)
 
 
 @njit(cache=True)
@@ -215,7 +215,7 @@ def _between(a: FloatArray, b: FloatArray, share: float, state: FloatArray) -> N
 
 @njit(cache=True)
 def _first_shares(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return at which shares of an edge there are poses in any case: evenly, and where a joint passes the base."""
+    """Return shares of an edge at which there are poses: evenly, and where a joint passes the base."""
     first, last = min(a[0], b[0]), max(a[0], b[0])
     low, high = int(np.ceil(first)), int(np.floor(last))
     passing = high - low + 1 if first < last else 0
@@ -359,7 +359,7 @@ def edge_is_clear(a: FloatArray, b: FloatArray, scene: FedScene) -> bool:
             if not is_clear(points, place_arm(poses[k], scene, points), scene, needs):
                 return False
         stride = half
-    for k in range(last):
+    for k in range(last):  # noqa: SIM110 - numba has no all()
         if not _piece_is_clear(poses[k], poses[k + 1], scene):
             return False
     return True

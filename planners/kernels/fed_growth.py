@@ -1,4 +1,4 @@
-"""Kernels that grow an arm out of a feeder, link by link, at angles that are exactly free; in link lengths."""
+"""Kernels that grow an arm out of a feeder, at angles that are exactly free; all in link lengths."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def free_directions(place: FloatArray, heading: float, most: float, walls: Float
 @njit(cache=True)
 def link_is_free(a: FloatArray, b: FloatArray, walls: FloatArray, need: float) -> bool:
     """Tell whether the segment ab meets no wall and is at least `need` from all."""
-    for wall in range(walls.shape[0]):
+    for wall in range(walls.shape[0]):  # noqa: SIM110 - numba has no all()
         if not keeps_off(a, b, walls[wall, 0], walls[wall, 1], need):
             return False
     return True
@@ -157,7 +157,7 @@ def _window(after: int, guide: Guide) -> tuple[int, int]:
 
 @njit(cache=True)
 def farthest_seen(place: FloatArray, after: int, guide: Guide, walls: FloatArray) -> int:
-    """Return the farthest guide point that is seen from a place, up to two link lengths after one; -1 if none is."""
+    """Return the farthest guide point, up to two links after one, seen from a place; -1 if none is."""
     first, last = _window(after, guide)
     for k in range(last, first - 1, -1):
         if link_is_free(place, guide.points[k], walls, 0.0):
@@ -170,7 +170,7 @@ def _directions(
     place: FloatArray, heading: float, most: float, ahead: FloatArray, walls: FloatArray, draws: FloatArray,
     angles: FloatArray,
 ) -> int:  # fmt: skip
-    """Fill in the angles to try at a joint: of each free range the ends and drawn ones, and that to a point."""
+    """Fill in the angles to try: of each free range the ends and drawn ones, and that to a point."""
     n, n_drawn = 0, 0
     aim = np.arctan2(ahead[1] - place[1], ahead[0] - place[0]) - heading
     aim = (aim + np.pi) % (2.0 * np.pi) - np.pi

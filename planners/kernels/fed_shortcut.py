@@ -23,7 +23,7 @@ def path_length(path: FloatArray) -> float:
 
 @njit(cache=True)
 def _cut(path: FloatArray, first: float, last: float, scene: FedScene) -> FloatArray:
-    """Return a path with its part between two shares of its length made straight, if that is shorter and free."""
+    """Return a path made straight between two shares of its length, if that is shorter and free."""
     lengths = np.zeros(len(path))
     for k in range(1, len(path)):
         lengths[k] = lengths[k - 1] + np.sqrt(np.sum((path[k] - path[k - 1]) ** 2))
