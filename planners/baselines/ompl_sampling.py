@@ -92,8 +92,9 @@ def plan_ompl(query: Query, *, algorithm: str = "RRTConnect", time_limit: float 
     Parameters
     ----------
     query : Query
-        Maze, arm and terms; a warm start is not used. OMPL promises the same random numbers for the same seed
-        to the first planner of a process only. Later ones get other numbers for another seed, too.
+        Maze, arm and terms; a warm start is not used. OMPL gives the same random numbers for the same seed
+        to the first planner of a process only, and the clock says how many shortcuts are tried: the same seed
+        does not always lead to the same motion.
     algorithm : str
         One of `OMPL_PLANNERS`.
     time_limit : float
