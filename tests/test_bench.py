@@ -4,23 +4,17 @@ import dataclasses
 import json
 import os
 
-import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
-from shapely.geometry import LineString
 
-from hrsnake_env.arm import ArmSpec, joints_from_configuration
 from hrsnake_env.errors import InputError
-from planners.baselines.ompl_sampling import FedArm, plan_ompl
-from planners.bench.beside import beside_ompl, ompl_tasks, run_one, u_turns
+from planners.bench.beside import beside_ompl, ompl_tasks, run_one
 from planners.bench.fits import exponent
 from planners.bench.pool import resumed
 from planners.bench.records import write_results
 from planners.bench.speed import PARTS, QUICK, run_speed
 from planners.bench.speed_tables import speed_markdown
-from planners.query import Query
-from planners.validation import validate
 
 TINY = dataclasses.replace(
     QUICK,
@@ -32,8 +26,6 @@ TINY = dataclasses.replace(
     seeds=1,
     compared=1,
 )
-ARM = FedArm(Query(maze=u_turns(1), arm=ArmSpec(link_length=220.0)), 4)
-STATES = st.tuples(st.floats(0.0, 4.0), *[st.floats(-3.0, 3.0)] * 3)
 
 
 def test_every_part_is_measured_and_written():
@@ -98,71 +90,11 @@ def test_a_file_of_something_else_is_left_alone(tmp_path):
     assert path.read_text() == "notes\n"
 
 
-@given(STATES)
-def test_a_state_places_the_arm_as_the_environment_does(state):
-    state = np.array(state)
-    motion = ARM.motion([state, state])
-    joints = joints_from_configuration(
-        motion.feed[-1], motion.joint_angles[-1], 220.0, ARM.query.maze.base_pose
-    )
-    assert ARM.tip(state) == pytest.approx(tuple(joints[-1]), abs=1e-6)
-    past = state[0] - (4 - np.arange(4))
-    assert (motion.joint_angles[-1][past <= 0.0] == 0.0).all()
-
-
-@given(STATES)
-def test_a_state_is_free_when_the_arm_is_in_the_free_space_and_does_not_meet_itself(state):
-    state = np.array(state)
-    maze, joints = ARM.query.maze, ARM.motion([state, state]).joints[-1]
-    past = state[0] - (4 - np.arange(5)) > 1e-9
-    line = LineString([maze.base_pose[:2], *(joints[past] if past.any() else [maze.base_pose[:2]])])
-    inside = line.within(maze.free_space)
-    assume(not inside or line.distance(maze.free_space.boundary) > 1e-6)  # a touch may be read either way
-    assert ARM.is_free(state) == (inside and line.is_simple)
-
-
-@given(STATES, STATES)
-def test_an_edge_keeps_the_checkers_step_limit_and_the_feeders_rule(a, b):
-    motion = ARM.motion([np.zeros(4), np.array(a), np.array(b)])
-    report = validate(motion, ARM.query.maze)
-    assert not {"step", "feeder", "start", "length", "inconsistent"} & {fault.kind for fault in report.faults}
-
-
-def test_the_start_is_free_and_the_edge_into_the_wall_is_not():
-    start, straight, through = np.zeros(4), np.array([3.0, 0, 0, 0]), np.array([4.0, 1.5, 0, 0])
-    assert ARM.edge_is_free(start, straight)
-    assert not ARM.edge_is_free(straight, through)
-
-
-def test_bad_questions_to_the_sampling_planners_are_refused():
-    with pytest.raises(InputError, match=r"Unknown OMPL planner 'Dijkstra'\. Available: KPIECE1"):
-        plan_ompl(ARM.query, algorithm="Dijkstra")
-    thick = Query(maze=u_turns(1), arm=ArmSpec(link_length=220.0, link_radius=5.0))
-    with pytest.raises(InputError, match="Expected thin links for OMPL, got a link radius of 5"):
-        plan_ompl(thick)
-
-
-def test_what_a_sampling_planner_finds_starts_in_the_feeder_and_ends_at_the_goal():
-    pytest.importorskip("ompl")
-    query = Query(maze=u_turns(1), arm=ArmSpec(link_length=220.0))
-    motion = plan_ompl(query, algorithm="RRTConnect", seed=1, time_limit=10.0).motion
-    assert motion is not None
-    faults = {fault.kind for fault in validate(motion, query.maze).faults}
-    assert faults <= {"penetration", "sweep"}  # it looks in steps and may clip a corner between two
-
-
-def test_a_sampling_planner_that_runs_out_of_time_says_so():
-    pytest.importorskip("ompl")
-    candidate = plan_ompl(ARM.query, algorithm="KPIECE1", time_limit=0.05)
-    assert candidate.motion is None
-    assert candidate.status == "out of time"
-
-
 def test_planners_are_counted_side_by_side():
     pytest.importorskip("ompl")
     tasks = [task for task in ompl_tasks((1,), (0.5,), (1,), 0.3) if task[2] != "KPIECE1"]
     rows = beside_ompl(tasks, workers=1)
-    assert [row["planner"] for row in rows] == ["auto", "sweep", "BKPIECE1", "RRTConnect"]
+    assert [row["planner"] for row in rows] == ["auto", "sweep", "BKPIECE1", "RRTConnect", "AORRTC"]
     assert all(row["runs"] == row["valid"] + row["invalid"] + row["unsolved"] for row in rows)
     assert rows[0]["valid"] == 1
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from planners.baselines.b_spline import plan_b_spline
 from planners.baselines.backbone import plan_backbone
+from planners.baselines.ompl_sampling import plan_aorrtc, plan_rrt_connect
 from planners.baselines.outer_wall import plan_outer_wall
 from planners.baselines.path_following import plan_path_following
 from planners.baselines.pseudo_inverse import plan_pseudo_inverse
@@ -22,5 +23,7 @@ BASELINES: dict[str, Callable[[Query], Candidate]] = {
     "backbone": plan_backbone,
     "virtual-torque": plan_virtual_torque,
     "pseudo-inverse": plan_pseudo_inverse,
+    "rrt-connect": plan_rrt_connect,
+    "aorrtc": plan_aorrtc,
 }
 """All baselines by name."""

@@ -1,66 +1,68 @@
 """Sampling-based planners of the Open Motion Planning Library (OMPL) on a fed arm.
 
 Everything that is not their business is made as easy for them as we could: states are such that none is lost
-to the feeder, states and edges are checked by compiled kernels, and our own motion gives the number of links
-and, where a planner wants goal states, whole arms at the goal.
+to the feeder, states and edges are checked by compiled kernels, whole arms at the goal are grown for them,
+and what they find is shortened. Nothing is taken from our own motions.
+
+References
+----------
+.. [1] I. Sucan, M. Moll and L. Kavraki, "The Open Motion Planning Library", IEEE Robotics & Automation
+   Magazine 19(4), 2012.
+.. [2] J. Kuffner and S. LaValle, "RRT-Connect: an efficient approach to single-query path planning", IEEE
+   International Conference on Robotics and Automation, 2000.
+.. [3] T. Wilson, W. Thomason, Z. Kingston and J. Gammell, "AORRTC: almost-surely asymptotically optimal
+   planning with RRT-Connect", IEEE Robotics and Automation Letters 10(12), 2025.
 """
 
 from __future__ import annotations
 
+import functools
 import importlib
 import importlib.util
 import math
 import time
-from dataclasses import dataclass
-from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hrsnake_env.arm import joints_from_configuration
+from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
-from planners.kernels import fed_arm as kernel
+from hrsnake_env.maze import Maze
+from planners.baselines.fed_states import MARGIN, FedArm, fed_arm, state_bounds
+from planners.baselines.goal_states import grown_goal_states, guide_along
 from planners.kernels.types import FloatArray
-from planners.problem import Candidate, Failure, Motion, PlanningStatus
+from planners.problem import Candidate, Failure, PlanningStatus
 from planners.query import Query
-from planners.sweep_planner import plan_sweep
-from planners.track_planner import plan_track
-from planners.validation import STEP_LIMIT
 
 if TYPE_CHECKING:
     from types import ModuleType
 
-__all__ = ["OMPL_PLANNERS", "FedArm", "is_installed", "plan_ompl"]
+__all__ = ["OMPL_PLANNERS", "is_installed", "plan_aorrtc", "plan_ompl", "plan_rrt_connect", "warm_up"]
 
-OMPL_PLANNERS = ("KPIECE1", "BKPIECE1", "RRTConnect")
+OMPL_PLANNERS = ("KPIECE1", "BKPIECE1", "RRTConnect", "AORRTC")
 """Those that can be asked for: the first wants a goal region, the others, which also grow from the goal, goal
 states; the first two want a projection."""
 
-TIME_LIMIT = 20.0
-"""Seconds that sampling may take by default."""
+TIME_LIMIT = 60.0
+"""Seconds that planning may take, if the query's deadline is not earlier."""
 
-RANGE = 0.3
+RANGE = 0.25
 """Longest edge, in rad and link lengths. The default, a fifth of the extent, solves next to nothing here."""
-
-STEP = 0.01
-"""Largest movement of a joint between two checks along an edge, in link lengths."""
-
-RELEASE = 4.0
-"""How far a joint may bend, in rad per link length that it is past the base: gentler than the environment's,
-so that angles do not change at once where a joint comes out; in a straight first leg it costs nothing."""
-
-MOST_BENT = 3.0
-"""Largest joint angle, in rad: short of folding a link back onto its neighbour."""
 
 CELL = 0.25
 """Size of a cell of KPIECE1's projection, the place of the tip, in link lengths."""
 
-SHARE_OF_LIMIT = 0.9
-"""Of the checker's step limit, that poses keep."""
+GOAL_STATES = 16
+"""Whole arms at the goal that are grown, at most."""
 
-GOAL_STATES = 8
-"""Whole arms at the goal that a planner that wants goal states is given."""
+FINER = 4.0
+"""By how much more links keep off the walls after the exact checker has refused a motion."""
+
+PATIENCE = 2.0
+"""Seconds that a planner gets with goal states once grown. Then others are grown, for twice as long."""
+
+SHORTENING = 0.2
+"""Seconds for which a path is shortened, at most; and no longer than it was searched."""
 
 
 def is_installed() -> bool:
@@ -68,193 +70,161 @@ def is_installed() -> bool:
     return importlib.util.find_spec("ompl") is not None
 
 
-def plan_ompl(
-    query: Query, *, algorithm: str = "RRTConnect", seed: int = 1, time_limit: float = TIME_LIMIT
-) -> Candidate:
+def plan_rrt_connect(query: Query) -> Candidate:
+    """Plan with RRT-Connect: two trees of random states, from the base and the goal, that try to meet [2]_.
+
+    Parameters and outcome are those of `plan_ompl`, which also says what a seed means.
+    """
+    return plan_ompl(query, algorithm="RRTConnect")
+
+
+def plan_aorrtc(query: Query) -> Candidate:
+    """Plan with AORRTC: RRT-Connect over states and cost [3]_, up to its first solution.
+
+    Parameters and outcome are those of `plan_ompl`, which also says what a seed means.
+    """
+    return plan_ompl(query, algorithm="AORRTC")
+
+
+def plan_ompl(query: Query, *, algorithm: str = "RRTConnect", time_limit: float = TIME_LIMIT) -> Candidate:
     """Plan with a planner of OMPL.
 
     Parameters
     ----------
     query : Query
-        Maze, arm and terms; link radius and warm start are not used.
+        Maze, arm and terms; a warm start is not used. OMPL gives the same random numbers for the same seed
+        to the first planner of a process only, and the clock says how many shortcuts are tried: the same seed
+        does not always lead to the same motion.
     algorithm : str
         One of `OMPL_PLANNERS`.
-    seed : int
-        Of its random numbers; positive.
     time_limit : float
-        Seconds that sampling may take, if the query's deadline is not earlier.
+        Seconds that planning may take, if the query's deadline is not earlier.
 
     Returns
     -------
     candidate : Candidate
-        What it takes for a solution, not validated; `timings["plan"]` is the time of sampling alone.
+        Not validated, unless the query has a checker: if that refuses a motion, planning goes on with links
+        that keep farther off the walls. Stages of `timings`: grow (goal states), plan (sampling), shortcut,
+        poses. Importing OMPL and loading kernels (`warm_up`) are not counted.
 
     Raises
     ------
     InputError
-        If OMPL is not installed, the planner is unknown, or links have a radius.
+        If OMPL is not installed or the planner is unknown.
     """
     if algorithm not in OMPL_PLANNERS:
         raise InputError(f"Unknown OMPL planner {algorithm!r}. Available: {', '.join(OMPL_PLANNERS)}.")
-    if query.arm.link_radius > 0.0:
-        raise InputError(f"Expected thin links for OMPL, got a link radius of {query.arm.link_radius:g}.")
+    warm_up()
+    return _plan(query, algorithm, min(query.deadline, time.perf_counter() + time_limit))
+
+
+@functools.cache
+def warm_up() -> None:
+    """Import OMPL and load the kernels, once per process.
+
+    Raises
+    ------
+    InputError
+        If OMPL is not installed.
+    """
     if not is_installed():
         raise InputError("Expected OMPL to be installed: pip install 'hrsnake[bench]'.")
-    clock = [time.perf_counter()]
-    given = plan_track(query).motion or plan_sweep(query).motion
-    if given is None:
-        return Candidate(
-            status=PlanningStatus.DEAD_END,
-            reason="Our planners, whose last pose gives number of links and goal states, found none.",
-            failure=Failure(place=(float(query.maze.goal[0]), float(query.maze.goal[1]))),
-        )
-    arm = FedArm(query, given.n_links)
-    goals = arm.goal_states(given, np.random.default_rng(seed))
-    arm.edge_is_free(goals[0], goals[0])  # the first call compiles it
     importlib.import_module("ompl.geometric")
-    clock.append(time.perf_counter())
-    limit = min(time_limit, query.deadline - clock[-1])
-    states = _solve(arm, goals, algorithm, seed, limit)
-    clock.append(time.perf_counter())
-    if states is None:
-        return Candidate(
-            status=PlanningStatus.OUT_OF_TIME,
-            reason=f"OMPL's {algorithm} found no way in {limit:.3g} s.",
-            failure=Failure(place=(float(query.maze.goal[0]), float(query.maze.goal[1]))),
-            timings={"given": clock[1] - clock[0], "plan": clock[2] - clock[1]},
-        )
-    motion = arm.motion(states)
-    clock.append(time.perf_counter())
-    timings = dict(zip(("given", "plan", "poses"), np.diff(clock).tolist(), strict=True))
-    return Candidate(status=PlanningStatus.SOLVED, motion=motion, timings=timings)
+    maze = Maze.from_corridors([(0.0, 0.0), (0.0, 300.0), (300.0, 300.0)], 100.0)
+    arm = ArmSpec(link_length=100.0)
+    _plan(Query(maze=maze, arm=arm), "RRTConnect", time.perf_counter() + TIME_LIMIT)
 
 
-@dataclass(frozen=True, eq=False)
-class FedArm:
-    """Hold what states of a fed arm mean in a maze (`planners.kernels.fed_arm`).
-
-    Parameters
-    ----------
-    query : Query
-        Maze and arm.
-    n_links : int
-        Number of links, and so of a state's coordinates.
-    """
-
-    query: Query
-    n_links: int
-
-    @cached_property
-    def terms(self) -> tuple[float, float, FloatArray]:
-        """Link length, release and base pose: what the kernels want of the arm."""
-        return float(self.query.arm.link_length), RELEASE, self.query.maze.base_pose
-
-    @cached_property
-    def walls(self) -> FloatArray:
-        """Start and end of each wall."""
-        return self.query.maze.walls
-
-    @cached_property
-    def most_bent(self) -> float:
-        """Largest joint angle."""
-        limit = self.query.arm.joint_limit
-        return MOST_BENT if limit is None else min(MOST_BENT, limit)
-
-    @cached_property
-    def points(self) -> FloatArray:
-        """Work space of the kernels."""
-        return np.empty((self.n_links + 1, 2))
-
-    def is_free(self, state: FloatArray) -> bool:
-        """Tell whether the arm in front of the base meets neither walls nor itself."""
-        return bool(kernel.state_is_free(state, *self.terms, self.walls, self.points))
-
-    def edge_is_free(self, a: FloatArray, b: FloatArray) -> bool:
-        """Tell whether the arm is free at b and, in small steps, from a, which is free, to b."""
-        step = STEP * self.terms[0]
-        return bool(kernel.edge_is_free(a, b, *self.terms, self.walls, step, self.points))
-
-    def tip(self, state: FloatArray) -> tuple[float, float]:
-        """Return where the tip is."""
-        last = kernel.place_arm(state, *self.terms, self.points) - 1
-        return float(self.points[last, 0]), float(self.points[last, 1])
-
-    def goal_distance(self, state: FloatArray) -> float:
-        """Return how far the tip is from the goal."""
-        return math.dist(self.tip(state), self.query.maze.goal)
-
-    def goal_states(self, motion: Motion, rng: np.random.Generator) -> list[FloatArray]:
-        """Return the last pose of a motion, and others near it that are free and at the goal, too."""
-        length = self.terms[0]
-        last = np.concatenate([[motion.feed[-1] / length], motion.joint_angles[-1, 1:]])
-        found, spread = [last], 0.1
-        for _ in range(2000):
-            if len(found) == GOAL_STATES:
-                break
-            state = last + rng.normal(scale=spread, size=len(last))
-            state[0] = min(max(state[0], 0.0), self.n_links)
-            spread = max(0.995 * spread, 1e-3)
-            if self.goal_distance(state) < self.query.maze.goal_radius and self.is_free(state):
-                found.append(state)
-        return found
-
-    def motion(self, states: list[FloatArray]) -> Motion:
-        """Return the poses at which the edges were checked, and those where a joint passes the base."""
-        length, _, base_pose = self.terms
-        path = np.concatenate([states[0][None], *(self._edge(a, b) for a, b in pairwise(states))])
-        return Motion.from_configurations(*self._configurations(path), length, base_pose)
-
-    def _edge(self, a: FloatArray, b: FloatArray) -> FloatArray:
-        """Return states after a, up to b, so near to each other that poses keep the checker's step limit."""
-        length, _, base_pose = self.terms
-        levels = kernel.edge_levels(a, b, *self.terms, STEP * length, self.points)
-        while True:
-            shares = np.arange((1 << levels) + 1) / (1 << levels)
-            if a[0] != b[0]:
-                passing = np.arange(math.ceil(min(a[0], b[0])), math.floor(max(a[0], b[0])) + 1)
-                shares = np.union1d(shares, (passing - a[0]) / (b[0] - a[0]))
-            edge = a + shares[:, None] * (b - a)
-            whole = np.round(edge[:, 0])
-            edge[:, 0] = np.where(np.abs(edge[:, 0] - whole) < 1e-12, whole, edge[:, 0])
-            joints = joints_from_configuration(*self._configurations(edge), length, base_pose)
-            steps = np.linalg.norm(np.diff(joints, axis=0), axis=-1)
-            if steps.max() <= SHARE_OF_LIMIT * STEP_LIMIT * length or levels == kernel.MOST_LEVELS:
-                return np.asarray(edge[1:])
-            levels += 1
-
-    def _configurations(self, states: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return feed, shape (n,), and joint angles, shape (n, n_links), of states, shape (n, n_links)."""
-        past = states[:, :1] - (self.n_links - np.arange(self.n_links))
-        limits = RELEASE * np.maximum(past, 0.0)
-        angles = np.clip(np.column_stack([np.zeros(len(states)), states[:, 1:]]), -limits, limits)
-        return states[:, 0] * self.terms[0], angles
+def _plan(query: Query, algorithm: str, deadline: float) -> Candidate:
+    """Grow goal states, search, shorten, and ask the checker, until it agrees or time is over."""
+    geometry, length = query.geometry, float(query.arm.link_length)
+    if geometry is None:
+        return query.no_path()
+    guide = guide_along(geometry.path.points, query.maze.goal, query.maze.goal_radius, length)
+    rng, timings, margin = np.random.default_rng(query.seed), dict(geometry.timings), MARGIN
+    start, patience, reason = time.perf_counter(), PATIENCE, "OMPL's {} found no way in {:.3g} s."
+    query.tell("plan", 0.1)
+    while True:
+        clock = [time.perf_counter()]
+        arm = fed_arm(geometry.maze, length, query.arm.link_radius, query.arm.joint_limit, margin)
+        goals, farthest = grown_goal_states(arm, guide, GOAL_STATES, rng, deadline)
+        clock.append(time.perf_counter())
+        if not goals:
+            _count(timings, clock)
+            return _no_goal_states(farthest, clock[-1] > deadline, timings)
+        path = _path(arm, goals, algorithm, query, min(patience, deadline - clock[-1]), rng)
+        clock.append(time.perf_counter())
+        if path is not None:
+            path = arm.shortened(path, rng, min(SHORTENING, clock[2] - clock[1], deadline - clock[2]))
+            clock.append(time.perf_counter())
+            motion = arm.motion(path)
+            clock.append(time.perf_counter())
+        _count(timings, clock)
+        if path is None and clock[-1] < deadline:
+            patience *= 2.0  # other goal states, perhaps of another number of links, may be nearer
+            continue
+        if path is None:
+            return Candidate(
+                status=PlanningStatus.OUT_OF_TIME,
+                reason=reason.format(algorithm, clock[-1] - start),
+                failure=Failure(place=(float(farthest[-1, 0]), float(farthest[-1, 1]))),
+                timings=timings,
+            )
+        report = query.check(motion)
+        if report is None or report.valid or time.perf_counter() > deadline:
+            return Candidate(status=PlanningStatus.SOLVED, motion=motion, timings=timings)
+        margin *= FINER
+        reason = "OMPL's {} found no way in {:.3g} s that the exact check agrees with."
 
 
-def _solve(
-    arm: FedArm, goals: list[FloatArray], algorithm: str, seed: int, time_limit: float
-) -> list[FloatArray] | None:
-    """Return the states of the path that a planner of OMPL finds, or None."""
+def _count(timings: dict[str, float], clock: list[float]) -> None:
+    """Add what the stages of a try have taken."""
+    for stage, seconds in zip(("grow", "plan", "shortcut", "poses"), np.diff(clock).tolist(), strict=False):
+        timings[stage] = timings.get(stage, 0.0) + seconds
+
+
+def _no_goal_states(farthest: FloatArray, late: bool, timings: dict[str, float]) -> Candidate:
+    """Say that no whole arm at the goal could be grown."""
+    x, y = (float(value) for value in farthest[-1])
+    return Candidate(
+        status=PlanningStatus.OUT_OF_TIME if late else PlanningStatus.DEAD_END,
+        reason=f"No whole arm could be grown to the goal{' in time' if late else ''}: the farthest ends at "
+        f"({x:.1f}, {y:.1f}).",
+        failure=Failure(place=(x, y), joints=farthest),
+        timings=timings,
+    )
+
+
+def _path(
+    arm: FedArm,
+    goals: list[FloatArray],
+    algorithm: str,
+    query: Query,
+    seconds: float,
+    rng: np.random.Generator,
+) -> FloatArray | None:
+    """Return the states of the path that a planner of OMPL finds, shape (n, n_links), or None."""
     from ompl import base, geometric, util
 
-    util.setLogLevel(util.LogLevel.LOG_NONE)
-    util.RNG.setSeed(seed)
-    space = base.RealVectorStateSpace(arm.n_links)
-    bounds = base.RealVectorBounds(arm.n_links)
-    bounds.setLow(-arm.most_bent)
-    bounds.setHigh(arm.most_bent)
-    bounds.setLow(0, 0.0)
-    bounds.setHigh(0, float(arm.n_links))
+    util.setLogLevel(util.LogLevel.LOG_NONE)  # it complains of every seed but the first
+    util.RNG.setSeed(int(rng.integers(1, 2**31)))
+    n_links = len(goals[0])
+    space = base.RealVectorStateSpace(n_links)
+    bounds = base.RealVectorBounds(n_links)
+    for axis, (low, high) in enumerate(state_bounds(n_links, arm.most_bent).tolist()):
+        bounds.setLow(axis, low)
+        bounds.setHigh(axis, high)
     space.setBounds(bounds)
     information = base.SpaceInformation(space)
-    parts = _parts(base, information, arm)
-    information.setStateValidityChecker(parts["is_free"])
+    parts = _parts(base, information, arm, n_links, query)
+    information.setStateValidityChecker(parts["is_clear"])
     information.setMotionValidator(parts["edges"])
     information.setup()
     problem = base.ProblemDefinition(information)
-    problem.addStartState(_state(space, np.zeros(arm.n_links)))
+    problem.addStartState(_state(space, np.zeros(n_links)))
     planner = getattr(geometric, algorithm)(information)
     planner.setRange(RANGE)
-    if algorithm != "RRTConnect":
+    if algorithm in ("KPIECE1", "BKPIECE1"):
         projection = parts["projection"]
         projection.inferCellSizes()  # without it there are none, and they cannot be set
         for axis in range(2):
@@ -269,11 +239,18 @@ def _solve(
         problem.setGoal(ends)
     planner.setProblemDefinition(problem)
     planner.setup()
-    planner.solve(base.timedPlannerTerminationCondition(max(time_limit, 1e-3)))
+    planner.solve(
+        base.plannerOrTerminationCondition(
+            base.timedPlannerTerminationCondition(max(seconds, 1e-3)),
+            base.exactSolnPlannerTerminationCondition(problem),  # AORRTC goes on without it
+        )
+    )
     if not problem.hasExactSolution():
         return None
-    path = problem.getSolutionPath()
-    return [_array(path.getState(k), arm.n_links) for k in range(path.getStateCount())]
+    found = problem.getSolutionPath()
+    path = np.array([found.getState(k)[0:n_links] for k in range(found.getStateCount())])
+    moved = np.concatenate([[True], (np.diff(path, axis=0) != 0.0).any(axis=1)])
+    return np.ascontiguousarray(path[moved])
 
 
 def _state(space: Any, values: FloatArray) -> Any:
@@ -282,31 +259,23 @@ def _state(space: Any, values: FloatArray) -> Any:
     return state
 
 
-def _array(state: Any, size: int) -> FloatArray:
-    return np.array(state[0:size])
-
-
-def _parts(base: ModuleType, information: Any, arm: FedArm) -> dict[str, Any]:
+def _parts(base: ModuleType, information: Any, arm: FedArm, n: int, query: Query) -> dict[str, Any]:
     """Build what a planner calls: validity of states and edges, the goal region and the projection."""
-    n, length = arm.n_links, arm.terms[0]
-    a, b = (
-        np.empty(n),
-        np.empty(n),
-    )  # filled in place: a new array for each state would cost more than a check
+    a, b = np.empty(n), np.empty(n)  # filled in place: a new array for each state costs more than a check
 
-    def is_free(state: Any) -> bool:
+    def is_clear(state: Any) -> bool:
         a[:] = state[0:n]
-        return arm.is_free(a)
+        return arm.is_clear(a)
 
     class Edges(base.MotionValidator):  # type: ignore[name-defined, misc]
         def checkMotion(self, start: Any, end: Any) -> bool:
             a[:], b[:] = start[0:n], end[0:n]
-            return arm.edge_is_free(a, b)
+            return arm.edge_is_clear(a, b)
 
     class Region(base.GoalRegion):  # type: ignore[name-defined, misc]
         def distanceGoal(self, state: Any) -> float:
             a[:] = state[0:n]
-            return arm.goal_distance(a)
+            return math.dist(arm.tip(a), query.maze.goal)
 
     class TipPlace(base.ProjectionEvaluator):  # type: ignore[name-defined, misc]
         def getDimension(self) -> int:
@@ -314,13 +283,12 @@ def _parts(base: ModuleType, information: Any, arm: FedArm) -> dict[str, Any]:
 
         def project(self, state: Any, projection: FloatArray) -> None:
             a[:] = state[0:n]
-            x, y = arm.tip(a)
-            projection[0], projection[1] = x / length, y / length
+            projection[0], projection[1] = arm.tip(a) / arm.link_length
 
     region = Region(information)
-    region.setThreshold(arm.query.maze.goal_radius)
+    region.setThreshold(query.maze.goal_radius)
     return {
-        "is_free": is_free,
+        "is_clear": is_clear,
         "edges": Edges(information),
         "region": region,
         "projection": TipPlace(information.getStateSpace()),

@@ -174,7 +174,7 @@ def _ompl(data: Mapping[str, Any] | None) -> Iterator[str]:
         return
     yield (
         f"**Beside OMPL**, at most {data['seconds']:g} s for each run; I is link length over the longest "
-        "rod; OMPL is given the number of links and whole arms at the goal:"
+        "rod; the times of OMPL's planners are with the growing of whole arms at the goal:"
     )
     yield ""
     yield from table(
