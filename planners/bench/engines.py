@@ -8,7 +8,8 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
 from multiprocessing.connection import wait
 from typing import Any
 
@@ -107,7 +108,6 @@ class _Worker:
 
 
 def _serve(run: Run, pipe: Any) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's business
     threading.Thread(target=_end_with_parent, daemon=True).start()
     while True:
         pipe.send(run(pipe.recv()))
@@ -120,10 +120,26 @@ def _end_with_parent() -> None:
     os._exit(1)  # in the midst of a cell, too: nobody would take its result
 
 
+@contextmanager
+def _no_ctrl_c() -> Iterator[None]:
+    """Ignore Ctrl-C in the block, and ever after in processes that are started in it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def _over_processes(cells: Sequence[Cell], run: Run, count: int) -> Done:
     waiting, tries = list(reversed(cells)), dict.fromkeys(cells, 0)
-    workers = [_Worker(run) for _ in range(min(count, len(cells)))]
+    workers: list[_Worker] = []
     try:
+        for _ in range(min(count, len(cells))):
+            with _no_ctrl_c():
+                workers.append(_Worker(run))
         while waiting or any(worker.cell for worker in workers):
             for worker in workers:
                 if worker.cell is None and waiting:
@@ -141,7 +157,8 @@ def _over_processes(cells: Sequence[Cell], run: Run, count: int) -> Done:
                 worker.cell = None
                 if result is None:
                     worker.end()
-                    workers[workers.index(worker)] = _Worker(run)
+                    with _no_ctrl_c():
+                        workers[workers.index(worker)] = _Worker(run)
                     tries[cell] = TRIES if late else tries[cell] + 1
                     if tries[cell] < TRIES:
                         waiting.append(cell)

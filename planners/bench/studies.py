@@ -244,7 +244,4 @@ def _chosen(tasks: Sequence[Task], patterns: Iterable[str]) -> list[Task]:
 
 def _learnt(task: Task, asked: bool) -> bool:
     """Tell whether methods that learn are given a task."""
-    if task.env_id is None:
-        return False
-    n_links = task.n_links if task.n_links is not None else task.env_kwargs.get("n_links", 0)
-    return asked or n_links <= MOST_LEARNT_LINKS
+    return task.env_id is not None and (asked or (task.n_links or 0) <= MOST_LEARNT_LINKS)

@@ -50,8 +50,8 @@ ROD_ACCURACY = 0.01
 SHAPE_LINKS = {"bend": 5, "u-turn": 5, "s-bend": 6}
 """Links with which learners are trained in short mazes; enough from the index 0.3 on."""
 
-TURN_WAY = 240.0
-"""Between the legs of a U-turn, in px."""
+TURN_LINKS = 0.7
+"""About what the turn takes beyond the legs: loose links cut its corners, tight ones zigzag in it."""
 
 LEG_LINKS = 3.5
 """Both legs of a short U-turn together, in links."""
@@ -202,6 +202,7 @@ def shape_task(shape: str, index: float, *, learnt: bool = False) -> Task:
         name=_task_name(shape, index),
         shape=shape,
         problem=partial(_grown, shape, maze, length, None),
+        n_links=n_links if learnt else None,
         simulate=True,
         env_id=ENV_ID if learnt else None,
         env_kwargs={**arguments, "max_episode_steps": STEPS_PER_LINK * n_links} if learnt else {},
@@ -211,7 +212,7 @@ def shape_task(shape: str, index: float, *, learnt: bool = False) -> Task:
 def leg_task(n_links: int, index: float) -> Task:
     """Return a U-turn at an index whose legs are so long that it takes about so many links."""
     length = index * RODS["u-turn"]
-    longer = max(1.0, (n_links - 0.6 - TURN_WAY / length) / LEG_LINKS)
+    longer = max(1.0, (n_links - TURN_LINKS) / LEG_LINKS)
     name = f"{_task_name('u-turn', index)}-n{n_links}"
     return Task(name=name, shape="u-turn", problem=partial(_grown, "u-turn", name, length, longer))
 
