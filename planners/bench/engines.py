@@ -9,7 +9,7 @@ import signal
 import threading
 import time
 from collections.abc import Generator, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import wait
 from typing import Any
 
@@ -109,8 +109,9 @@ class _Worker:
 
 def _serve(run: Run, pipe: Any) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    while True:
-        pipe.send(run(pipe.recv()))
+    with suppress(EOFError, ConnectionError):  # the parent has ended
+        while True:
+            pipe.send(run(pipe.recv()))
 
 
 def _end_with_parent() -> None:
