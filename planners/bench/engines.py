@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 import multiprocessing
 import os
 import signal
@@ -82,12 +83,12 @@ class _Worker:
         self.process.start()
         theirs.close()
         self.cell: Cell | None = None
-        self.overdue = float("inf")
+        self.overdue = math.inf
 
     def give(self, cell: Cell) -> None:
         """Hand over a cell; a worker that is dead already is found by `answer`."""
         self.cell = cell
-        self.overdue = time.monotonic() + (cell.patience or float("inf"))
+        self.overdue = time.monotonic() + (cell.patience or math.inf)
         try:
             self.pipe.send(cell)
         except OSError:
@@ -139,36 +140,50 @@ def _over_processes(cells: Sequence[Cell], run: Run, count: int) -> Done:
     workers: list[_Worker] = []
     try:
         for _ in range(min(count, len(cells))):
-            with _no_ctrl_c():
-                workers.append(_Worker(run))
+            _start(workers, run)
         while waiting or any(worker.cell for worker in workers):
             for worker in workers:
                 if worker.cell is None and waiting:
                     worker.give(waiting.pop())
-            busy = [worker for worker in workers if worker.cell is not None]
-            soonest = min(worker.overdue for worker in busy)
-            timeout = None if soonest == float("inf") else max(0.0, soonest - time.monotonic())
-            ready = wait([worker.pipe for worker in busy], timeout)
-            for worker in busy:
-                late = time.monotonic() >= worker.overdue
-                if worker.pipe not in ready and not late:
-                    continue
-                cell, result = worker.cell, worker.answer() if worker.pipe in ready else None
-                assert cell is not None
-                worker.cell = None
+            for worker, cell, result, late in _answers(workers):
                 if result is None:
+                    workers.remove(worker)
                     worker.end()
-                    with _no_ctrl_c():
-                        workers[workers.index(worker)] = _Worker(run)
-                    tries[cell] = TRIES if late else tries[cell] + 1
-                    if tries[cell] < TRIES:
+                    _start(workers, run)
+                    tries[cell] += 1
+                    if tries[cell] < TRIES and not late:
                         waiting.append(cell)
                         continue
-                    result = CellResult(rows=error_rows(cell, HUNG if late else DIED))
-                yield cell, result
+                yield cell, result or CellResult(rows=error_rows(cell, HUNG if late else DIED))
     finally:
         for worker in workers:
             worker.end()
+
+
+def _start(workers: list[_Worker], run: Run) -> None:
+    with _no_ctrl_c():
+        workers.append(_Worker(run))
+
+
+def _answers(workers: Sequence[_Worker]) -> list[tuple[_Worker, Cell, CellResult | None, bool]]:
+    """Wait until a worker has something to say, or is overdue.
+
+    Returns
+    -------
+    answers : list of (worker, cell, result, late)
+        Of each such worker; no result if it has died, or is late.
+    """
+    busy = [worker for worker in workers if worker.cell is not None]
+    soonest = min(worker.overdue for worker in busy)
+    timeout = None if math.isinf(soonest) else max(0.0, soonest - time.monotonic())
+    ready, answers = wait([worker.pipe for worker in busy], timeout), []
+    for worker in busy:
+        late = worker.pipe not in ready and time.monotonic() >= worker.overdue
+        if worker.pipe in ready or late:
+            cell, worker.cell = worker.cell, None
+            assert cell is not None
+            answers.append((worker, cell, None if late else worker.answer(), late))
+    return answers
 
 
 # Ray

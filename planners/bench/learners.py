@@ -13,6 +13,7 @@ import gymnasium as gym
 
 from planners.bench.cells import EVERY_ACTIONS, Cell, CellResult, row_of
 from planners.bench.episodes import RandomPolicy, episode_facts
+from planners.bench.planned import warm_up
 from planners.bench.tasks import Task, known_maze
 
 __all__ = ["LEARNERS", "Learner", "Trained", "run_learner", "run_random"]
@@ -54,6 +55,7 @@ Learner = Callable[[Task, int, int, Path], Trained]
 def run_learner(cell: Cell) -> CellResult:
     """Train, and test with mean and with sampled actions: `cell.episodes` rows each, and the policy."""
     known_maze(cell.task)
+    _warm_up(cell.task)
     with tempfile.TemporaryDirectory() as folder:
         trained = LEARNERS[cell.method](cell.task, cell.seed, int(cell.budget), Path(folder))
     problem, rows = cell.task.problem(0), []
@@ -75,6 +77,15 @@ def run_learner(cell: Cell) -> CellResult:
             for number, facts in enumerate(tested)
         ]
     return CellResult(rows=rows, files={".npz": trained.policy})
+
+
+def _warm_up(task: Task) -> None:
+    """Have all compiled that a training may need, so that its time does not count it."""
+    warm_up("auto")
+    env = gym.make(f"hrsnake_env:{task.env_id}", **task.env_kwargs)
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+    env.close()
 
 
 def run_random(cell: Cell) -> CellResult:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import dataclasses
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 from hrsnake_env.errors import InputError
 from hrsnake_env.ladder import LADDER, RODS
 from planners.bench.cells import Cell
-from planners.bench.learners import LEARNERS
 from planners.bench.methods import METHODS, PLANNING, available, draws
 from planners.bench.planned import MOST_LENGTHS
 from planners.bench.tasks import (
@@ -65,6 +66,11 @@ class Amount:
         That test a policy.
     seeds : tuple of int
         Of methods that draw; the others have the first.
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range.
     """
 
     budget: float
@@ -72,6 +78,14 @@ class Amount:
     mazes: int = 20
     episodes: int = 100
     seeds: tuple[int, ...] = (0, 1, 2)
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.budget < math.inf):
+            raise InputError(f"Expected a positive, finite budget in seconds, got {self.budget:g}.")
+        if self.train_steps < 1:
+            raise InputError(f"Expected at least one step of training, got {self.train_steps}.")
+        if min(self.seeds) < 0:
+            raise InputError(f"Expected seeds of at least 0, got {min(self.seeds)}.")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -193,42 +207,42 @@ def study_cells(
         raise InputError(f"Unknown study {study!r}. Available: {', '.join(STUDIES)}.")
     chosen = STUDIES[study]
     amount = chosen.quick if quick else chosen.full
-    budget = amount.budget if budget is None else budget
-    train_steps = amount.train_steps if train_steps is None else train_steps
-    seeds = tuple(dict.fromkeys(seeds)) or amount.seeds
-    if not (0.0 < budget < float("inf")):
-        raise InputError(f"Expected a positive, finite budget in seconds, got {budget:g}.")
-    if train_steps < 1:
-        raise InputError(f"Expected at least one step of training, got {train_steps}.")
-    if min(seeds) < 0:
-        raise InputError(f"Expected seeds of at least 0, got {min(seeds)}.")
+    amount = dataclasses.replace(
+        amount,
+        budget=amount.budget if budget is None else budget,
+        train_steps=amount.train_steps if train_steps is None else train_steps,
+        seeds=tuple(dict.fromkeys(seeds)) or amount.seeds,
+    )
     named = available(methods or chosen.methods, skip_missing)
-    found = _chosen(chosen.tasks(amount.mazes), tasks or (chosen.few if quick else ("*",)))
-    cells = []
-    for task in found:
-        for method in named:
-            if method not in PLANNING and not _learnt(task, bool(tasks)):
-                continue
-            # A training has its own length; random actions and planners have none.
-            unit, most = ("s", budget) if method in PLANNING else ("steps", float(train_steps))
-            episodes = amount.episodes
-            if method in PLANNING:
-                episodes = MOST_LENGTHS if task.scan else task.n_mazes
-            cells += [
-                Cell(
-                    study=study,
-                    method=method,
-                    task=task,
-                    seed=seed,
-                    budget=most if method in LEARNERS or method in PLANNING else 0.0,
-                    budget_unit=unit,
-                    episodes=episodes,
-                )
-                for seed in (seeds if draws(method) else seeds[:1])
-            ]
+    patterns = tasks or (chosen.few if quick else ("*",))
+    cells = [
+        cell
+        for task in _chosen(chosen.tasks(amount.mazes), patterns)
+        for method in named
+        if method in PLANNING or _learnt(task, asked=bool(tasks))
+        for cell in _cells(study, task, method, amount)
+    ]
     if not cells:
         raise InputError(f"Expected a method that the tasks are for, got {', '.join(named)}.")
     return cells
+
+
+def _cells(study: str, task: Task, method: str, amount: Amount) -> Iterator[Cell]:
+    """Yield a cell for each seed that a method has."""
+    if method in PLANNING:
+        unit, budget, episodes = "s", amount.budget, MOST_LENGTHS if task.scan else task.n_mazes
+    else:
+        unit, budget, episodes = "steps", float(amount.train_steps), amount.episodes
+    for seed in amount.seeds if draws(method) else amount.seeds[:1]:
+        yield Cell(
+            study=study,
+            method=method,
+            task=task,
+            seed=seed,
+            budget=budget if method != "random" else 0.0,  # nothing is trained
+            budget_unit=unit,
+            episodes=episodes,
+        )
 
 
 def _chosen(tasks: Sequence[Task], patterns: Iterable[str]) -> list[Task]:
@@ -242,6 +256,6 @@ def _chosen(tasks: Sequence[Task], patterns: Iterable[str]) -> list[Task]:
     return [task for task in tasks if task.name in kept]
 
 
-def _learnt(task: Task, asked: bool) -> bool:
+def _learnt(task: Task, *, asked: bool) -> bool:
     """Tell whether methods that learn are given a task."""
     return task.env_id is not None and (asked or (task.n_links or 0) <= MOST_LEARNT_LINKS)
