@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import io
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -113,7 +112,9 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     """
     arrow, parquet = _pyarrow()
     try:
-        table = parquet.read_table(io.BytesIO(path.read_bytes()))
+        # Without Arrow's threads: they may abort the process at its end (apache/arrow#34314, #50482).
+        file = parquet.ParquetFile(arrow.BufferReader(path.read_bytes()))
+        table = file.read(use_threads=False)
     except arrow.ArrowInvalid:
         raise InputError(f"Expected rows of a benchmark (Parquet) in '{path}', got something else.") from None
     if table.column_names != list(COLUMNS):
