@@ -343,6 +343,7 @@ def test_ctrl_c_says_how_to_go_on(tmp_path, monkeypatch, capsys):
         (["--seeds", "one"], "Expected seeds as whole numbers with commas (0,1,2), got 'one'."),
         (["--methods", "track", "--engine", "steam"], "Unknown engine 'steam'. Available: processes, ray."),
         (["--methods", "track", "--address", "auto"], "Expected an address for the engine 'ray' alone"),
+        (["--methods", "track", "--engine", "ray", "--address", "127.0.0.1:1"], "Expected a Ray cluster at"),
         (["--methods", "track", "--workers", "0"], "Expected at least one worker, got 0."),
     ],
 )

@@ -7,6 +7,7 @@ import math
 import multiprocessing
 import os
 import signal
+import socket
 import threading
 import time
 from collections.abc import Generator, Iterator, Sequence
@@ -28,6 +29,8 @@ HUNG = "worker did not come back"
 """Reason of a cell whose worker was ended as it took many times its budget."""
 
 TRIES = 2
+
+CONNECT_SECONDS = 10.0
 
 AT_ONCE = 4
 """Cells for each processor that a Ray cluster has been handed at any time."""
@@ -65,6 +68,7 @@ def over_cells(
     if workers is not None and workers < 1:
         raise InputError(f"Expected at least one worker, got {workers}.")
     if engine == "ray":
+        _check_reachable(address)
         return _over_ray(cells, run, workers, address)
     return _over_processes(cells, run, workers or os.cpu_count() or 1)
 
@@ -225,6 +229,17 @@ def _ray() -> Any:
         raise InputError("Expected Ray to be installed: pip install 'hrsnake[bench]'.") from None
 
 
+def _check_reachable(address: str | None) -> None:
+    """Refuse a host and port where nobody listens: Ray itself would try for minutes."""
+    host, _, port = (address or "").rpartition(":")
+    if not host or "/" in host or not port.isdigit():
+        return  # such as auto, or ray://host:port
+    try:
+        socket.create_connection((host, int(port)), CONNECT_SECONDS).close()
+    except OSError as error:
+        raise InputError(f"Expected a Ray cluster at '{address}', got: {error}.") from None
+
+
 def _connect(ray: Any, workers: int | None, address: str | None) -> None:
     """Join the cluster, or start Ray here; no code is uploaded: workers have the package installed."""
     options: dict[str, Any] = {"log_to_driver": False, "logging_level": "error"}
@@ -236,4 +251,4 @@ def _connect(ray: Any, workers: int | None, address: str | None) -> None:
         ray.init(**options)
     except (ConnectionError, ValueError, RuntimeError) as error:
         text = " ".join(str(error).split())
-        raise InputError(f"Expected a Ray cluster at '{address}', got: {text}") from None
+        raise InputError(f"Expected a Ray cluster at '{address or 'this machine'}', got: {text}") from None
