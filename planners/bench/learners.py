@@ -110,7 +110,7 @@ def run_random(cell: Cell) -> CellResult:
     return CellResult(rows=rows)
 
 
-def _from_package(module: str, function: str, *first: str) -> Learner:
+def _from_package(module: str, function: str, method: str) -> Learner:
     """Return a learner of `planners.rl`, which is imported when it is asked."""
 
     def learn(task: Task, seed: int, steps: int, folder: Path) -> Trained:
@@ -118,7 +118,7 @@ def _from_package(module: str, function: str, *first: str) -> Learner:
         train: Any = getattr(importlib.import_module(f"planners.rl.{module}"), function)
         evaluate: Any = importlib.import_module("planners.rl.evaluate").evaluate
         run = train(
-            *first,
+            method,
             task.env_id,
             seed=seed,
             steps=steps,
@@ -152,7 +152,6 @@ LEARNERS: dict[str, Learner] = {
         name: _from_package("train", "train", name)
         for name in ("ppo", "ppo-planned", "ppo-residual", "sac", "tqc-her")
     },
-    "clone": _from_package("clone", "train_clone", "clone"),
-    "dagger": _from_package("clone", "train_clone", "dagger"),
+    **{name: _from_package("clone", "clone", name) for name in ("clone", "dagger")},
 }
 """All methods that learn, by name."""

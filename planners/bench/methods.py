@@ -28,6 +28,7 @@ NEEDED = {
     **dict.fromkeys(SAMPLING, ("ompl", "bench")),
     **dict.fromkeys(LEARNERS, ("stable_baselines3", "rl")),
     "tqc-her": ("sb3_contrib", "rl"),
+    **dict.fromkeys(("clone", "dagger"), ("torch", "rl")),
 }
 """The package that a method needs, and the extra that brings it."""
 
