@@ -22,6 +22,7 @@ from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import MAZES, Maze
 from planners import longest, tables
+from planners.cli_bench import add_studies
 from planners.length_trials import motion_path
 from planners.planning import PLANNERS, TIME_BUDGET, plan
 from planners.problem import Motion, PlanningResult, Progress
@@ -42,6 +43,7 @@ app = typer.Typer(
 
 bench_app = typer.Typer(help="Measure, and print tables to paste.")
 app.add_typer(bench_app, name="bench")
+add_studies(bench_app)
 
 # Some versions of typer carry their own copy of click: its base of all usage errors is found by name.
 UsageError: type[Exception] = next(

@@ -36,8 +36,8 @@ class Demonstrator:
 
     The loop is closed: every action goes from where the arm has been sent to the pose after the nearest one
     of the motion, so errors do not add up. The motion keeps a distance from the walls where there is room
-    (`planners.motion_cache.MARGINS`). Noise that would take a link into a wall is halved until it does not, so demonstrations in
-    tight mazes mostly reach the goal, too.
+    (`planners.motion_cache.MARGINS`). Noise that would take a link into a wall is halved until it does not,
+    so demonstrations in tight mazes mostly reach the goal, too.
 
     Parameters
     ----------

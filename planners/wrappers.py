@@ -59,9 +59,10 @@ class PlannedResets(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     A start is a waypoint of the motion, drawn uniformly from those with the tip outside the goal's radius. In
     tight mazes learners need them in order: with `recede`, starts are near the goal at first, and recede from
     it along the motion as fast as the learner succeeds from where they are (reverse curriculum, also known as
-    backplay). The motions keep a distance from the walls where there is room for it. Where there is no plan, episodes start at the base. A reset whose options say where to start (`feed`,
-    `joint_angles`, `motion`, `waypoint` or `state`) is passed on as it is. The draws are the wrapper's own,
-    and repeat with the seed of `reset`.
+    backplay). The motions keep a distance from the walls where there is room for it. Where there is no plan,
+    episodes start at the base. A reset whose options say where to start (`feed`, `joint_angles`, `motion`,
+    `waypoint` or `state`) is passed on as it is. The draws are the wrapper's own, and repeat with the seed of
+    `reset`.
 
     `info["waypoint"]`, there from the reset on, is the waypoint that the episode started at; -1 if the
     wrapper has not chosen one, as at the base. `info["receded"]` is the share of the motion that starts have

@@ -13,6 +13,8 @@ import numpy as np
 
 from hrsnake_env.errors import InputError
 from hrsnake_env.ladder import LADDER
+from planners.bench.campaign import MANIFEST, ROWS
+from planners.bench.rows import COLUMNS
 
 __all__ = [
     "METHODS",
@@ -32,29 +34,6 @@ __all__ = [
     "time_limit",
     "typical_seconds",
 ]
-
-ROWS = "rows.parquet"
-"""What a study writes into its folder."""
-
-MANIFEST = "manifest.json"
-"""What it says beside about its runs and their machines."""
-
-COLUMNS = {
-    **dict.fromkeys(("study", "method", "task", "shape", "maze"), "string"),
-    **{"link_length": "float64", "n_links": "int64", "longest_rod": "float64", "index": "float64"},
-    **{
-        "seed": "int64",
-        "episode": "int64",
-        "actions": "string",
-        "budget": "float64",
-        "budget_unit": "string",
-    },
-    **{"status": "string", "reason": "string", "solved": "bool", "success": "bool", "clean": "bool"},
-    **dict.fromkeys(("seconds", "cpu_seconds", "check_seconds"), "float64"),
-    **{"train_steps": "int64", "steps": "int64", "return": "float64", "progress": "float64"},
-    **{"worst_depth": "float64", "collisions": "int64", "pinches": "int64"},
-}
-"""Types of the columns, as Arrow names them."""
 
 NEVER_NULL = ("study", "method", "task", "shape", "maze", "index", "seed", "episode", "actions", "solved")
 
@@ -126,7 +105,8 @@ def _read(path: Path) -> list[Row]:
     if not path.is_file():
         raise InputError(f"Expected a folder with {ROWS}, as a study writes it, but there is no '{path}'.")
     try:
-        table = parquet.read_table(path)
+        # Without Arrow's threads, as `rows.read_rows` has it.
+        table = parquet.ParquetFile(pyarrow.BufferReader(path.read_bytes())).read(use_threads=False)
     except pyarrow.ArrowException as error:
         raise InputError(f"Expected a Parquet file, but '{path}' is none: {error}.") from None
     if missing := [name for name in COLUMNS if name not in table.column_names]:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from planners.kernels.fed_arm import is_free
+from planners.kernels.fed_arm import keeps_off
 from planners.kernels.field_algebra import factorise
 from planners.kernels.field_arm import (
     RELEASE,
@@ -250,10 +250,20 @@ def advance(task: Task, run: Run, k: int, n_contacts: int, velocity: FloatArray,
         k_after = place_points(run.trial, task.heading, run.chain)
         moved = _longest_move(run.points, k, run.chain, k_after, run.trial[0] - feed)
         _, least = find_contacts(run.chain, k_after, task.walls, task.reach, run.contacts)
-        if moved <= LONGEST and least >= MARGIN and is_free(run.chain, k_after + 1, task.walls[:0]):
+        if moved <= LONGEST and least >= MARGIN and not _crosses_itself(run.chain, k_after + 1):
             run.state[:] = run.trial
             return bool(moved > 0.0)
         time *= 0.5
+    return False
+
+
+@njit(cache=True)
+def _crosses_itself(points: FloatArray, n: int) -> bool:
+    """Tell whether two links of a chain of n points meet that are not neighbours."""
+    for k in range(n - 1):
+        for other in range(k + 2, n - 1):
+            if not keeps_off(points[k], points[k + 1], points[other], points[other + 1], 0.0):
+                return True
     return False
 
 
