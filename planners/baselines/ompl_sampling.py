@@ -249,6 +249,11 @@ def _path(
         return None
     found = problem.getSolutionPath()
     path = np.array([found.getState(k)[0:n_links] for k in range(found.getStateCount())])
+    if (path[0] != 0.0).any():
+        # Where one straight edge reaches a goal state, AORRTC may give that state alone.
+        if not arm.edge_is_clear(np.zeros(n_links), path[0]):
+            return None
+        path = np.concatenate([np.zeros((1, n_links)), path])
     moved = np.concatenate([[True], (np.diff(path, axis=0) != 0.0).any(axis=1)])
     return np.ascontiguousarray(path[moved])
 
