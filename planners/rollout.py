@@ -22,7 +22,7 @@ from hrsnake_env.simulation import simulate
 from planners.controllers import PlannedPolicy
 from planners.problem import Motion, Progress
 
-__all__ = ["Episode", "Policy", "run_episode", "simulate_motion"]
+__all__ = ["Episode", "Policy", "episode_facts", "run_episode", "simulate_motion"]
 
 ENV_ID = f"{hrsnake_env.__name__}:HyperRedundantMaze-v0"
 
@@ -173,6 +173,59 @@ def run_episode(
         report=world.physics.report(),
         seconds=time.perf_counter() - began,
     )
+
+
+def episode_facts(
+    env: gym.Env[Any, Any],
+    policy: Policy,
+    seed: int | None = None,
+    *,
+    options: dict[str, Any] | None = None,
+    deterministic: bool = True,
+) -> dict[str, Any]:
+    """Run one episode, and return what came of it, without its poses.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        `HyperRedundantMaze-v0`, wrapped or not.
+    policy : Policy
+        Which acts.
+    seed : int, optional
+        For `env.reset`.
+    options : dict, optional
+        For `env.reset`, such as the `task_id`.
+    deterministic : bool
+        What the policy is asked for.
+
+    Returns
+    -------
+    facts : dict
+        `task_id`; `success`; `clean`, whether links merely pinched the walls; `steps`; `return`, the sum of
+        rewards; `progress`, the share of the way at the end; `worst_depth` in a wall, in link lengths;
+        `collisions`, how often the policy saw one; `pinches`, links summed over steps.
+    """
+    world: Any = env.unwrapped
+    observation, info = env.reset(seed=seed, options=options)
+    state, start, over, collisions = None, np.array([True]), False, 0
+    while not over:
+        action, state = policy.predict(
+            observation, state=state, episode_start=start, deterministic=deterministic
+        )
+        observation, _, terminated, truncated, info = env.step(action)
+        collisions += bool(info["collisions"])
+        start, over = np.array([False]), terminated or truncated
+    return {
+        "task_id": info["task_id"],
+        "success": bool(info["is_success"]),
+        "clean": bool(world.physics.report().clean),
+        "steps": int(info["total_steps"]),
+        "return": float(info["total_reward"]),
+        "progress": float(info["progress"]),
+        "worst_depth": float(info["worst_depth"]) / world.arm.link_length,
+        "collisions": collisions,
+        "pinches": int(info["total_pinches"]),
+    }
 
 
 def simulate_motion(

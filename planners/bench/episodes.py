@@ -11,9 +11,12 @@ from numpy.typing import NDArray
 from planners.bench.tasks import ENV_ID, Problem
 from planners.controllers import PlannedPolicy
 from planners.problem import Motion
-from planners.rollout import Policy
+from planners.rollout import episode_facts
 
-__all__ = ["RandomPolicy", "episode_facts", "motion_facts"]
+__all__ = ["MEASURED", "RandomPolicy", "motion_facts"]
+
+MEASURED = ("success", "clean", "steps", "return", "progress", "worst_depth", "collisions", "pinches")
+"""What a row holds of an episode."""
 
 SLACK = 10
 """Steps that an episode may take beyond its motion: the arm is a substep behind its target."""
@@ -38,42 +41,6 @@ class RandomPolicy:
         return action.astype(self._space.dtype), state
 
 
-def episode_facts(
-    env: gym.Env[Any, Any], policy: Policy, seed: int | None = None, options: dict[str, Any] | None = None
-) -> dict[str, Any]:
-    """Run one episode, and return what a row says of it.
-
-    Parameters
-    ----------
-    env : gymnasium.Env
-        `HyperRedundantMaze-v0`, wrapped or not.
-    policy : Policy
-        Which acts.
-    seed : int, optional
-        For `env.reset`.
-    options : dict, optional
-        For `env.reset`, such as the `task_id`.
-    """
-    world: Any = env.unwrapped
-    observation, info = env.reset(seed=seed, options=options)
-    state, start, over, collisions = None, np.array([True]), False, 0
-    while not over:
-        action, state = policy.predict(observation, state=state, episode_start=start)
-        observation, _, terminated, truncated, info = env.step(action)
-        collisions += bool(info["collisions"])
-        start, over = np.array([False]), terminated or truncated
-    return {
-        "success": bool(info["is_success"]),
-        "clean": bool(world.physics.report().clean),
-        "steps": int(info["total_steps"]),
-        "return": float(info["total_reward"]),
-        "progress": float(info["progress"]),
-        "worst_depth": float(info["worst_depth"]) / world.arm.link_length,
-        "collisions": collisions,
-        "pinches": int(info["total_pinches"]),
-    }
-
-
 def motion_facts(motion: Motion, problem: Problem) -> dict[str, Any]:
     """Drive the simulated arm along a motion, and return what a row says of it."""
     policy = PlannedPolicy(motion)
@@ -85,6 +52,7 @@ def motion_facts(motion: Motion, problem: Problem) -> dict[str, Any]:
         n_links=motion.n_links,
     )
     try:
-        return episode_facts(env, policy)
+        facts = episode_facts(env, policy)
+        return {name: facts[name] for name in MEASURED}
     finally:
         env.close()

@@ -12,16 +12,15 @@ from typing import Any
 import gymnasium as gym
 
 from planners.bench.cells import EVERY_ACTIONS, Cell, CellResult, row_of
-from planners.bench.episodes import RandomPolicy, episode_facts
+from planners.bench.episodes import MEASURED, RandomPolicy
 from planners.bench.planned import warm_up
 from planners.bench.tasks import Task, known_maze
+from planners.rollout import episode_facts
 
 __all__ = ["LEARNERS", "Learner", "Trained", "run_learner", "run_random"]
 
 TEST_SEED = 1_000_000
 """Of the first episode that tests a policy; trainings take their seeds from below."""
-
-MEASURED = ("success", "clean", "steps", "return", "progress", "worst_depth", "collisions", "pinches")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -103,7 +102,7 @@ def run_random(cell: Cell) -> CellResult:
                 actions="sampled",
                 status="evaluated",
                 solved=facts["success"],
-                **facts,
+                **{name: facts[name] for name in MEASURED},
             )
         )
     env.close()

@@ -12,7 +12,7 @@ from hrsnake_env.replay import Trace
 from planners.rl.environments import make_env
 from planners.rl.network import NetworkPolicy
 from planners.rl.settings import FIRST_SEED
-from planners.rollout import Policy, run_episode
+from planners.rollout import Policy, episode_facts, run_episode
 
 __all__ = ["FACTS", "evaluate", "evaluate_both", "replayed", "summary"]
 
@@ -53,8 +53,8 @@ def evaluate(
     facts : list of dict
         `seed`, `task_id` and, for each of `FACTS`: whether the tip came to the goal, and whether links merely
         pinched the walls; the sum of rewards; the number of steps; the share of the way at the end; the
-        deepest place of a link in a wall, in link lengths; links that collided and that pinched, summed over
-        steps.
+        deepest place of a link in a wall, in link lengths; how often the policy saw a collision, and links
+        that pinched, summed over steps (`planners.rollout.episode_facts`).
 
     Raises
     ------
@@ -148,26 +148,6 @@ def _env_of(policy: Policy, env_id: str | None) -> Any:
 
 
 def _episode(policy: Policy, env: Any, seed: int, deterministic: bool) -> dict[str, Any]:
-    world = env.unwrapped
     if isinstance(policy, NetworkPolicy):
         policy.reseed(seed)
-    observation, info = env.reset(seed=seed)
-    state, start, over = None, np.array([True]), False
-    while not over:
-        action, state = policy.predict(
-            observation, state=state, episode_start=start, deterministic=deterministic
-        )
-        observation, _, terminated, truncated, info = env.step(action)
-        start, over = np.array([False]), terminated or truncated
-    return {
-        "seed": seed,
-        "task_id": info["task_id"],
-        "success": bool(info["is_success"]),
-        "clean": bool(world.pinch_report().clean),
-        "return": float(info["total_reward"]),
-        "steps": int(info["total_steps"]),
-        "progress": float(info["progress"]),
-        "worst_depth": float(info["worst_depth"] / world.arm.link_length),
-        "collisions": int(info["total_collisions"]),
-        "pinches": int(info["total_pinches"]),
-    }
+    return {"seed": seed, **episode_facts(env, policy, seed, deterministic=deterministic)}
