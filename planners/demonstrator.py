@@ -13,14 +13,9 @@ from hrsnake_env.arm import ArmSpec, FloatArray, joints_from_configuration
 from hrsnake_env.errors import InputError
 from hrsnake_env.task import FEED_STEP, JOINT_STEP, next_target
 from planners.controllers import actions_of
-from planners.motion_cache import MotionCache
+from planners.motion_cache import MARGINS, MotionCache
 
-__all__ = ["MARGINS", "Demonstrator"]
-
-MARGINS = (0.1, 0.05, 0.02, 0.01, 0.0)
-"""Distances to the walls that are asked of a motion, in link lengths; the first with a plan is taken.
-
-Motions planned without one touch the walls, and who imitates them with the least error collides."""
+__all__ = ["Demonstrator"]
 
 KEPT = 0.005
 """So near to a wall noise does not take a link, in link lengths: links in haste stray.
@@ -41,7 +36,7 @@ class Demonstrator:
 
     The loop is closed: every action goes from where the arm has been sent to the pose after the nearest one
     of the motion, so errors do not add up. The motion keeps a distance from the walls where there is room
-    (`MARGINS`). Noise that would take a link into a wall is halved until it does not, so demonstrations in
+    (`planners.motion_cache.MARGINS`). Noise that would take a link into a wall is halved until it does not, so demonstrations in
     tight mazes mostly reach the goal, too.
 
     Parameters

@@ -13,7 +13,15 @@ from hrsnake_env.maze import Maze
 from planners.planning import PLANNERS, plan
 from planners.problem import Motion
 
-__all__ = ["N_MAZES", "MotionCache", "maze_key"]
+__all__ = ["MARGINS", "N_MAZES", "MotionCache", "maze_key"]
+
+MARGINS = (0.1, 0.05, 0.02, 0.01, 0.0)
+"""Distances to the walls that are asked of a motion to learn from, in link lengths; the first with a plan is
+taken.
+
+Motions planned without one touch the walls: who imitates them with the least error collides, and so does who
+tries something else from one of their poses.
+"""
 
 N_MAZES = 100
 """For so many mazes motions are kept."""

@@ -10,18 +10,18 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
-from hrsnake_env.arguments import is_number
+from hrsnake_env.arguments import check_at_least, is_number
 from hrsnake_env.arm import ArmSpec, FloatArray, feeder_angle_limits
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from hrsnake_env.task import FEED_STEP, JOINT_STEP
 from planners.baselines.path_following import STOP, followed_track
 from planners.feeding import feed, motion_of
-from planners.motion_cache import N_MAZES, MotionCache, maze_key
+from planners.motion_cache import MARGINS, N_MAZES, MotionCache, maze_key
 from planners.problem import Motion
 from planners.query import Query
 
-__all__ = ["PlannedResets", "ResidualFollower", "follow_the_leader"]
+__all__ = ["ActionRepeat", "PlannedResets", "ResidualFollower", "follow_the_leader"]
 
 AT_BASE = -1
 
@@ -34,6 +34,18 @@ OWN_STREAM = 1
 AT_GOAL = 1e-6
 """By so much of the goal's radius a start must be outside it, as simulated places are rounded."""
 
+LAST_PART = 0.1
+"""Starts that recede begin in this last part of the motion, and then in parts of this length."""
+
+PART_STARTS = 0.6
+"""Share of the starts on the motion that are in the part to be learnt; the others are anywhere after it."""
+
+PART_EPISODES, LEARNT, LOST = 8, 0.7, 0.1
+"""After so many episodes from a part, starts recede if this share succeeded, and come back if only that."""
+
+RECEDE = 0.05
+"""By this share of the motion starts recede; they come back by a third of it."""
+
 SLOWEST = 0.01
 """The feed never waits with less than this share of its step."""
 
@@ -44,13 +56,16 @@ class PlannedResets(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     Measured: learners that always start at the base stay at half the way in tight U-turns; with 70 % of the
     starts on a planned motion the same learners come through within minutes.
 
-    A start is a waypoint of the motion, drawn uniformly from those with the tip outside the goal's radius.
-    Where there is no plan, episodes start at the base. A reset whose options say where to start (`feed`,
+    A start is a waypoint of the motion, drawn uniformly from those with the tip outside the goal's radius. In
+    tight mazes learners need them in order: with `recede`, starts are near the goal at first, and recede from
+    it along the motion as fast as the learner succeeds from where they are (reverse curriculum, also known as
+    backplay). The motions keep a distance from the walls where there is room for it. Where there is no plan, episodes start at the base. A reset whose options say where to start (`feed`,
     `joint_angles`, `motion`, `waypoint` or `state`) is passed on as it is. The draws are the wrapper's own,
     and repeat with the seed of `reset`.
 
     `info["waypoint"]`, there from the reset on, is the waypoint that the episode started at; -1 if the
-    wrapper has not chosen one, as at the base.
+    wrapper has not chosen one, as at the base. `info["receded"]` is the share of the motion that starts have
+    left, from the goal; 1 where all of it is drawn from.
 
     Parameters
     ----------
@@ -62,6 +77,8 @@ class PlannedResets(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         Of the episodes that start on the motion, from 0 to 1.
     planner : str
         See `planners.plan`.
+    recede : bool
+        Whether starts recede from the goal.
 
     Raises
     ------
@@ -76,12 +93,14 @@ class PlannedResets(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         *,
         share: float = 0.7,
         planner: str = "auto",
+        recede: bool = False,
     ) -> None:
-        RecordConstructorArgs.__init__(self, motion=motion, share=share, planner=planner)
+        RecordConstructorArgs.__init__(self, motion=motion, share=share, planner=planner, recede=recede)
         gym.Wrapper.__init__(self, env)
         if not (is_number(share) and 0.0 <= share <= 1.0):
             raise InputError(f"Expected a share from 0 to 1, got {share!r}.")
-        self.share, self._motions = float(share), MotionCache(planner)
+        self.share, self._motions = float(share), MotionCache(planner, MARGINS)
+        self._receding = _Receding() if recede else None
         if motion is not None:
             self._motions.add(motion, self._world.maze, self._world.arm)
         self._rng = np.random.default_rng()
@@ -97,9 +116,11 @@ class PlannedResets(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         """Start an episode, on the motion or at the base; see `HyperRedundantMazeEnv.reset`."""
         if seed is not None:
             self._rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(OWN_STREAM,)))
-        share, place = self._rng.random(2)  # always both, so that no draw depends on an earlier plan
+        share, place, part = self._rng.random(3)  # always all, so that no draw depends on an earlier plan
         observation, info = self.env.reset(seed=seed, options=options)
         self._waypoint = AT_BASE
+        if self._receding is not None:
+            place = self._receding.place(place, part)
         given = {key: value for key, value in (options or {}).items() if value is not None}
         if share < self.share and not any(key in given for key in START_OPTIONS):
             # Only now the maze is known. It is kept: what was drawn at random is asked for by its number.
@@ -108,12 +129,18 @@ class PlannedResets(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
                 task = {"task_id": info["task_id"]} if info["task_id"] >= 0 else {}
                 observation, info = self.env.reset(options={**given, **task, **start})
                 self._waypoint = start["waypoint"]
-        return observation, {**info, "waypoint": self._waypoint}
+        return observation, {**info, **self._told()}
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Take a step; its info says where the episode has started."""
         observation, reward, terminated, truncated, info = self.env.step(action)
-        return observation, reward, terminated, truncated, {**info, "waypoint": self._waypoint}
+        if (terminated or truncated) and self._receding is not None and self._waypoint != AT_BASE:
+            self._receding.ended(bool(info["is_success"]))
+        return observation, reward, terminated, truncated, {**info, **self._told()}
+
+    def _told(self) -> dict[str, Any]:
+        receded = 1.0 if self._receding is None else 1.0 - self._receding.front
+        return {"waypoint": self._waypoint, "receded": receded}
 
     def _start(self, place: float) -> dict[str, Any]:
         """Return reset options for the waypoint at a place in [0, 1) among those to draw from."""
@@ -124,6 +151,70 @@ class PlannedResets(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         away = np.hypot(*(motion.joints[:, -1] - maze.goal).T) > (1.0 + AT_GOAL) * maze.goal_radius
         waypoints = np.flatnonzero(away)
         return {"motion": motion, "waypoint": int(waypoints[int(place * len(waypoints))])}
+
+
+class _Receding:
+    """Say where along a motion episodes start, farther from the goal the more of them succeed."""
+
+    def __init__(self) -> None:
+        self.front = 1.0 - LAST_PART
+        self._in_part = False
+        self._successes: list[bool] = []
+
+    def place(self, place: float, part: float) -> float:
+        """Return a place in [0, 1) along the motion for two numbers drawn from there."""
+        self._in_part = part < PART_STARTS
+        return self.front + place * (LAST_PART if self._in_part else 1.0 - self.front)
+
+    def ended(self, success: bool) -> None:
+        """Take note of how an episode has ended that started on the motion."""
+        if not self._in_part:
+            return
+        self._successes.append(success)
+        if len(self._successes) < PART_EPISODES:
+            return
+        rate = sum(self._successes[-PART_EPISODES:]) / PART_EPISODES
+        if rate >= LEARNT or rate <= LOST:
+            back = -RECEDE if rate >= LEARNT else RECEDE / 3.0
+            self.front = min(max(self.front + back, 0.0), 1.0 - LAST_PART)
+            self._successes = []
+
+
+class ActionRepeat(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
+    """Take every action several times, so that a learner decides less often; rewards add up.
+
+    Measured: links move by a fiftieth of their length in a step, and learners that decide in each one lose
+    sight of a goal hundreds of steps away; with four to eight steps to a decision they learn in a fraction of
+    the time.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        Any environment.
+    repeat : int
+        Steps to a decision, at least 1.
+
+    Raises
+    ------
+    InputError
+        If `repeat` is not a positive whole number.
+    """
+
+    def __init__(self, env: gym.Env[Any, Any], repeat: int = 4) -> None:
+        RecordConstructorArgs.__init__(self, repeat=repeat)
+        gym.Wrapper.__init__(self, env)
+        check_at_least("repeat", repeat, 1, whole=True)
+        self.repeat = int(repeat)
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """Take up to `repeat` steps; fewer where the episode ends."""
+        total = 0.0
+        for _ in range(self.repeat):
+            observation, reward, terminated, truncated, info = self.env.step(action)
+            total += float(reward)
+            if terminated or truncated:
+                break
+        return observation, total, terminated, truncated, info
 
 
 class ResidualFollower(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):

@@ -11,7 +11,7 @@ from hrsnake_env import ArmSpec, InputError, Maze
 from hrsnake_env.ladder import LADDER
 from planners import plan
 from planners.motion_cache import MotionCache
-from planners.wrappers import PlannedResets, ResidualFollower, follow_the_leader
+from planners.wrappers import ActionRepeat, PlannedResets, ResidualFollower, follow_the_leader
 
 TIGHT = "hrsnake_env:HyperRedundantMaze-UTurn-I80-v0"
 RANDOM = "hrsnake_env:HyperRedundantMaze-RandomTrain-v0"
@@ -50,7 +50,7 @@ def test_a_share_of_none_or_all_is_none_or_all(motion, share, planned):
 
 
 def test_a_planned_start_is_the_waypoint_of_the_motion_and_never_at_the_goal(motion):
-    env = PlannedResets(gym.make(TIGHT), share=1.0)
+    env = PlannedResets(gym.make(TIGHT), motion, share=1.0)
     maze = env.unwrapped.maze
     env.reset(seed=3)
     seen = []
@@ -74,6 +74,70 @@ def test_every_waypoint_outside_the_goal_can_be_a_start_and_no_other(motion):
     with pytest.raises(InputError, match="outside the goal's radius"):
         env.reset(options={"motion": motion, "waypoint": start["waypoint"] + 1})
     assert env._start(0.0)["waypoint"] == 0
+
+
+def test_planned_starts_keep_away_from_the_walls():
+    env = PlannedResets(gym.make(TIGHT), share=1.0)
+    clearances = [env.reset(seed=k)[1]["clearance"] for k in range(30)]
+    assert min(clearances) > 0.019 * LADDER["u-turn-i80"].link_length
+
+
+def receding_starts(env, n, success):
+    """Return where n episodes start, as shares of the motion, with the ends that they are made to have."""
+    places = []
+    for k in range(n):
+        _, info = env.reset(seed=k if k == 0 else None)
+        places.append(info["waypoint"])
+        if info["waypoint"] >= 0:
+            env._receding.ended(success)
+    return np.array(places)
+
+
+def test_starts_that_recede_begin_near_the_goal_and_come_to_the_base_with_success(motion):
+    env = PlannedResets(gym.make(TIGHT), motion, share=1.0, recede=True)
+    last = env.reset(seed=0) and env._start(1.0 - 1e-12)["waypoint"]
+    places = receding_starts(env, 20, success=False)
+    assert places.min() > 0.88 * last
+    places = receding_starts(env, 600, success=True)
+    assert places[-100:].min() < 0.1 * last
+    assert env.reset()[1]["receded"] == 1.0
+    assert np.mean(places[-100:] < 0.11 * last) == pytest.approx(0.6, abs=0.2)  # most in the part to be learnt
+
+
+def test_starts_that_recede_come_back_where_nothing_succeeds(motion):
+    env = PlannedResets(gym.make(TIGHT), motion, share=1.0, recede=True)
+    receding_starts(env, 100, success=True)
+    there = env.reset()[1]["receded"]
+    receding_starts(env, 60, success=False)
+    assert 0.1 <= env.reset()[1]["receded"] < there
+
+
+def test_all_of_the_motion_is_drawn_from_unless_starts_recede(motion):
+    assert PlannedResets(gym.make(TIGHT), motion).reset(seed=0)[1]["receded"] == 1.0
+
+
+def test_a_repeated_action_is_so_many_steps_and_its_reward_their_sum():
+    repeated, bare = ActionRepeat(gym.make(TIGHT), 4), gym.make(TIGHT)
+    repeated.reset(seed=0), bare.reset(seed=0)
+    action = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.1])
+    observation, reward, *_ = repeated.step(action)
+    steps = [bare.step(action) for _ in range(4)]
+    np.testing.assert_array_equal(observation, steps[-1][0])
+    assert reward == pytest.approx(sum(step[1] for step in steps), abs=1e-12)
+
+
+def test_a_repeated_action_stops_where_the_episode_ends():
+    env = ActionRepeat(gym.make(TIGHT, max_episode_steps=6), 4)
+    env.reset(seed=0)
+    steps = [env.step(np.zeros(6)) for _ in range(2)]
+    assert [truncated for _, _, _, truncated, _ in steps] == [False, True]
+    assert [info["total_steps"] for *_, info in steps] == [4, 6]
+
+
+@pytest.mark.parametrize("repeat", [0, -1, 1.5, "4"])
+def test_a_repeat_that_is_no_count_is_refused(repeat):
+    with pytest.raises(InputError, match="repeat"):
+        ActionRepeat(gym.make(TIGHT), repeat)
 
 
 @pytest.mark.parametrize("env_id", [TIGHT, RANDOM])
