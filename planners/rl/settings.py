@@ -14,10 +14,13 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.registration import ENVIRONMENTS
 from planners.rl.environments import TRAINING_ONLY, WRAPPERS, Wrappers, check_env_id
 
-__all__ = ["FIRST_SEED", "METHODS", "Settings", "load_settings", "settings_file"]
+__all__ = ["CLONING", "FIRST_SEED", "METHODS", "Settings", "load_settings", "settings_file"]
 
 METHODS = ("ppo", "ppo-planned", "ppo-residual", "sac", "tqc-her")
 """Each is an algorithm, where its episodes start, and what its actions mean."""
+
+CLONING = ("clone", "dagger")
+"""Methods that imitate a planner; they have no files of settings, and observe what "ppo" does."""
 
 FIRST_SEED = 1_000_000
 """Of the first episode of an evaluation, far from those that trainings begin with."""
@@ -138,8 +141,10 @@ def settings_file(method: str) -> Path:
     InputError
         If there is no such method.
     """
+    if method in CLONING:
+        raise InputError(f"Expected a method with settings ({', '.join(METHODS)}), got {method!r}.")
     if method not in METHODS:
-        raise InputError(f"Unknown method {method!r}. Available: {', '.join(METHODS)}.")
+        raise InputError(f"Unknown method {method!r}. Available: {', '.join((*METHODS, *CLONING))}.")
     return FOLDER / f"{method}.yml"
 
 
@@ -160,7 +165,8 @@ def load_settings(method: str, env_id: str, *, file: str | os.PathLike[str] | No
     InputError
         If a method, an environment, or what the file holds is unknown, or PyYAML is not installed.
     """
-    path = settings_file(method) if file is None else Path(file)
+    own = settings_file(method)
+    path = own if file is None else Path(file)
     check_env_id(env_id)
     entries = _read(path)
     for name in entries:
