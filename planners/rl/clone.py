@@ -289,7 +289,9 @@ class _School:
         noise, best, idle, over = float(rng.choice(NOISES)), 0.0, 0, False
         while not (over or idle > PATIENCE or self._stop.asked):
             taught = self._teacher.action()
-            seen.append(gym.spaces.flatten(self.env.observation_space, observation))
+            seen.append(
+                np.asarray(gym.spaces.flatten(self.env.observation_space, observation), dtype=np.float32)
+            )
             told.append(taught)
             own = pupil is not None and rng.random() >= beta
             action = pupil.predict(observation)[0] if pupil is not None and own else taught
