@@ -135,7 +135,7 @@ def test_mazes_without_a_plan_are_left_out(monkeypatch):
     env.reset()
     assert np.array_equal(observation, env.reset()[0])
     monkeypatch.setattr(Demonstrator, "begin", lambda _: False)
-    with pytest.raises(InputError, match="Expected mazes with planned motions to imitate, got none in"):
+    with pytest.raises(InputError, match="Expected planned motions to imitate, got none in"):
         school._start(5)
     env.close()
 

@@ -37,7 +37,8 @@ class TrainingRun:
     steps, episodes : int
         Of all environments together, over all resumed runs.
     success : float or None
-        Share of the last 100 episodes that began at the base, with actions sampled as in training.
+        Share of the last 100 episodes that began at the base, with actions sampled as in training; of
+        imitation, of the test episodes after the last round.
     success_planned : float or None
         The same of episodes that began elsewhere, as on a planned motion.
     stopped : {"learnt", "steps", "interrupted"}

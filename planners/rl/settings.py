@@ -96,7 +96,7 @@ class Settings:
     Parameters
     ----------
     method : str
-        One of `METHODS`.
+        One of `METHODS`, or of `CLONING`.
     env_id : str
         A registered id.
     n_timesteps : int
