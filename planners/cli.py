@@ -26,7 +26,7 @@ from planners.cli_bench import add_studies
 from planners.length_trials import motion_path
 from planners.planning import PLANNERS, TIME_BUDGET, plan
 from planners.problem import Motion, PlanningResult, Progress
-from planners.rl.settings import FIRST_SEED, METHODS
+from planners.rl.settings import CLONING, FIRST_SEED, METHODS
 from planners.validation import validate
 
 __all__ = ["app", "main"]
@@ -340,7 +340,7 @@ def dataset_command(
 @app.command("train")
 def train_command(
     env_id: Annotated[str, typer.Argument(metavar="ENV_ID", help="As HyperRedundantMaze-Straight-v0.")],
-    method: Annotated[str, typer.Option("--method", help=f"{', '.join(METHODS)}.")] = "ppo",
+    method: Annotated[str, typer.Option("--method", help=f"{', '.join((*METHODS, *CLONING))}.")] = "ppo",
     seed: Annotated[int, typer.Option("--seed", help="The same seed gives the same policy.")] = 0,
     steps: Annotated[
         int | None, typer.Option("--steps", help="Of all environments together; by default the settings'.")
@@ -360,7 +360,7 @@ def train_command(
     from planners.rl.train import train
 
     folder = Path(f"{env_id}-{method}-{seed}") if out is None else out
-    chosen = load_settings(method, env_id, file=settings)
+    chosen = None if settings is None else load_settings(method, env_id, file=settings)
     _check_folder(folder)
     run = train(
         method,

@@ -21,7 +21,7 @@ from planners.motion_cache import MARGINS, N_MAZES, MotionCache, maze_key
 from planners.problem import Motion
 from planners.query import Query
 
-__all__ = ["ActionRepeat", "PlannedResets", "ResidualFollower", "follow_the_leader"]
+__all__ = ["ActionRepeat", "PlannedResets", "ResidualFollower", "StepCost", "follow_the_leader"]
 
 AT_BASE = -1
 
@@ -216,6 +216,44 @@ class ActionRepeat(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
             if terminated or truncated:
                 break
         return observation, total, terminated, truncated, info
+
+
+class StepCost(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
+    """Take a cost off the reward of every step, and off `compute_reward` alike.
+
+    Measured: with hindsight replay and a reward for success alone, a learner stays where it is: there it
+    is at a replayed goal again and again, which pays more than a success that ends the episode once. With
+    a cost of 1 both are worth 0, the most there is. Collisions must cost more then, such as
+    `contact_penalty=10`, or the learner ends the cost by one.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        Any environment, wrapped or not.
+    cost : float
+        Of a step; at least 0.
+
+    Raises
+    ------
+    InputError
+        If the cost is not a finite number from 0 on.
+    """
+
+    def __init__(self, env: gym.Env[Any, Any], cost: float = 1.0) -> None:
+        RecordConstructorArgs.__init__(self, cost=cost)
+        gym.Wrapper.__init__(self, env)
+        check_at_least("cost", cost, 0.0)
+        self.cost = float(cost)
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Take a step; its reward is less by the cost."""
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        return observation, float(reward) - self.cost, terminated, truncated, info
+
+    def compute_reward(self, achieved_goal: Any, desired_goal: Any, info: Any) -> Any:
+        """Return the rewards of replayed goals, less by the cost; see `HyperRedundantMazeEnv.goal_reward`."""
+        rewards = self.env.get_wrapper_attr("compute_reward")(achieved_goal, desired_goal, info)
+        return np.subtract(rewards, self.cost)
 
 
 class ResidualFollower(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):

@@ -149,7 +149,7 @@ def _from_package(module: str, function: str, method: str) -> Learner:
 LEARNERS: dict[str, Learner] = {
     **{
         name: _from_package("train", "train", name)
-        for name in ("ppo", "ppo-planned", "ppo-residual", "sac", "tqc-her")
+        for name in ("ppo", "ppo-planned", "ppo-residual", "sac", "tqc", "tqc-her")
     },
     **{name: _from_package("clone", "clone", name) for name in ("clone", "dagger")},
 }

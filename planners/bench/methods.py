@@ -27,6 +27,7 @@ SAMPLING = ("rrt-connect", "aorrtc")
 NEEDED = {
     **dict.fromkeys(SAMPLING, ("ompl", "bench")),
     **dict.fromkeys(LEARNERS, ("stable_baselines3", "rl")),
+    "tqc": ("sb3_contrib", "rl"),
     "tqc-her": ("sb3_contrib", "rl"),
     **dict.fromkeys(("clone", "dagger"), ("torch", "rl")),
 }

@@ -105,6 +105,7 @@ STYLES = {
     "ppo-planned": Style(colour="#4a9fd8", marker="p", width=2.2),
     "ppo-residual": Style(colour="#b1569a", marker="^"),
     "sac": Style(colour="#009e73", marker="v"),
+    "tqc": Style(colour="#a6761d", marker="H"),
     "tqc-her": Style(colour="#e69f00", marker="h"),
     "clone": Style(colour="#6b7480", marker="H"),
     "dagger": Style(colour="#8c6d31", marker="X"),

@@ -48,7 +48,7 @@ METHODS = (
     *("beam", "as-printed"),
     *("follow", "outer-wall", "b-spline", "backbone", "virtual-torque", "pseudo-inverse"),
     *("rrt-connect", "aorrtc"),
-    *("ppo", "ppo-planned", "ppo-residual", "sac", "tqc-her", "clone", "dagger", "random"),
+    *("ppo", "ppo-planned", "ppo-residual", "sac", "tqc", "tqc-her", "clone", "dagger", "random"),
 )
 """The order in which methods are shown; others come after them."""
 

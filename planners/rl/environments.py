@@ -10,9 +10,9 @@ import gymnasium as gym
 import hrsnake_env
 from hrsnake_env.errors import InputError
 from hrsnake_env.registration import ENVIRONMENTS
-from planners.wrappers import ActionRepeat, PlannedResets, ResidualFollower
+from planners.wrappers import ActionRepeat, PlannedResets, ResidualFollower, StepCost
 
-__all__ = ["TRAINING_ONLY", "WRAPPERS", "Wrappers", "check_env_id", "make_env"]
+__all__ = ["TRAINING_KWARGS", "TRAINING_ONLY", "WRAPPERS", "Wrappers", "check_env_id", "make_env"]
 
 Wrappers = tuple[tuple[str, dict[str, Any]], ...]
 """Names with arguments, innermost first."""
@@ -21,11 +21,21 @@ WRAPPERS: dict[str, Any] = {
     "planners.wrappers.ActionRepeat": ActionRepeat,
     "planners.wrappers.PlannedResets": PlannedResets,
     "planners.wrappers.ResidualFollower": ResidualFollower,
+    "planners.wrappers.StepCost": StepCost,
 }
 """The wrappers that settings and policies may name."""
 
-TRAINING_ONLY = ("planners.wrappers.PlannedResets",)
-"""Wrappers that decide where episodes start: an evaluation starts at the base."""
+TRAINING_ONLY = ("planners.wrappers.PlannedResets", "planners.wrappers.StepCost")
+"""Wrappers that help to learn: an evaluation starts at the base, and has the environment's own rewards."""
+
+TRAINING_KWARGS = (
+    "contact_penalty",
+    "max_episode_steps",
+    "reward_type",
+    "substeps",
+    "terminate_on_collision",
+)
+"""Arguments that make practice easier or shorter: an evaluation has the registered ones."""
 
 
 def check_env_id(env_id: str) -> None:

@@ -12,12 +12,15 @@ from typing import Any
 from hrsnake_env.arguments import check_at_least, is_number
 from hrsnake_env.errors import InputError
 from hrsnake_env.registration import ENVIRONMENTS
-from planners.rl.environments import TRAINING_ONLY, WRAPPERS, Wrappers, check_env_id
+from planners.rl.environments import TRAINING_KWARGS, TRAINING_ONLY, WRAPPERS, Wrappers, check_env_id
 
-__all__ = ["FIRST_SEED", "METHODS", "Settings", "load_settings", "settings_file"]
+__all__ = ["CLONING", "FIRST_SEED", "METHODS", "Settings", "load_settings", "settings_file"]
 
-METHODS = ("ppo", "ppo-planned", "ppo-residual", "sac", "tqc-her")
+METHODS = ("ppo", "ppo-planned", "ppo-residual", "sac", "tqc", "tqc-her")
 """Each is an algorithm, where its episodes start, and what its actions mean."""
+
+CLONING = ("clone", "dagger")
+"""Methods that imitate a planner; they have no files of settings, and observe what "ppo" does."""
 
 FIRST_SEED = 1_000_000
 """Of the first episode of an evaluation, far from those that trainings begin with."""
@@ -29,6 +32,7 @@ ALGORITHMS = {
     "ppo-planned": "ppo",
     "ppo-residual": "ppo",
     "sac": "sac",
+    "tqc": "tqc",
     "tqc-her": "tqc",
 }
 """RL Zoo's `--algo` for each method's file."""
@@ -94,7 +98,7 @@ class Settings:
     Parameters
     ----------
     method : str
-        One of `METHODS`.
+        One of `METHODS`, or of `CLONING`.
     env_id : str
         A registered id.
     n_timesteps : int
@@ -131,6 +135,11 @@ class Settings:
         return tuple(entry for entry in self.wrappers if entry[0] not in TRAINING_ONLY)
 
     @property
+    def evaluation_kwargs(self) -> dict[str, Any]:
+        """The environment's arguments without those that only training has."""
+        return {key: value for key, value in self.env_kwargs.items() if key not in TRAINING_KWARGS}
+
+    @property
     def repeat(self) -> int:
         """Steps of the environment to a decision of the learner."""
         repeats = (entry[1].get("repeat", 1) for entry in self.wrappers)
@@ -145,8 +154,10 @@ def settings_file(method: str) -> Path:
     InputError
         If there is no such method.
     """
+    if method in CLONING:
+        raise InputError(f"Expected a method with settings ({', '.join(METHODS)}), got {method!r}.")
     if method not in METHODS:
-        raise InputError(f"Unknown method {method!r}. Available: {', '.join(METHODS)}.")
+        raise InputError(f"Unknown method {method!r}. Available: {', '.join((*METHODS, *CLONING))}.")
     return FOLDER / f"{method}.yml"
 
 
@@ -167,7 +178,8 @@ def load_settings(method: str, env_id: str, *, file: str | os.PathLike[str] | No
     InputError
         If a method, an environment, or what the file holds is unknown, or PyYAML is not installed.
     """
-    path = settings_file(method) if file is None else Path(file)
+    own = settings_file(method)
+    path = own if file is None else Path(file)
     check_env_id(env_id)
     entries = _read(path)
     for name in entries:

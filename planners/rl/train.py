@@ -5,88 +5,25 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from hrsnake_env.arguments import check_at_least, is_number
 from hrsnake_env.errors import InputError
-from hrsnake_env.files import replacing
-from planners.rl.checkpoints import read_progress, write_checkpoint
+from planners.rl.checkpoints import write_checkpoint
+from planners.rl.clone import clone
 from planners.rl.models import learners, new_model, resumed_model, vector
-from planners.rl.network import NetworkPolicy, Origin
-from planners.rl.settings import METHODS, Settings, load_settings
+from planners.rl.network import NetworkPolicy
+from planners.rl.runs import CHECKPOINT, TrainingRun, old_progress, origin_of, write_run
+from planners.rl.settings import CLONING, METHODS, Settings, load_settings
 from planners.rl.watch import Progress, Watch, stop_on_interrupt, training_bar
 
 __all__ = ["METHODS", "TrainingRun", "train"]
 
 CHECKPOINT_STEPS = {"ppo": 50_000, "sac": 10_000, "tqc": 10_000}
 """From one checkpoint to the next: about as long for each, as steps of off-policy learners take longer."""
-
-STOPPED = {
-    "learnt": "the task is learnt",
-    "steps": "all steps are done",
-    "interrupted": "by Ctrl-C; --resume goes on",
-}
-
-CHECKPOINT, POLICY, RUN = "checkpoint.zip", "policy.npz", "run.json"
-
-
-@dataclass(frozen=True, kw_only=True)
-class TrainingRun:
-    """Hold what came of a training.
-
-    Parameters
-    ----------
-    method, env_id, seed
-        What was trained.
-    steps, episodes : int
-        Of all environments together, over all resumed runs.
-    success : float or None
-        Share of the last 100 episodes that began at the base, with actions sampled as in training.
-    success_planned : float or None
-        The same of episodes that began elsewhere, as on a planned motion.
-    stopped : {"learnt", "steps", "interrupted"}
-        Why it ended.
-    cpu_seconds, seconds : float
-        Of the process, and on the clock; over all resumed runs.
-    curve : tuple of (steps, cpu_seconds, success)
-        The learning curve.
-    policy, checkpoint : Path
-        Files in the folder.
-    """
-
-    method: str
-    env_id: str
-    seed: int
-    steps: int
-    episodes: int
-    success: float | None
-    success_planned: float | None
-    stopped: str
-    cpu_seconds: float
-    seconds: float
-    curve: tuple[tuple[float, ...], ...]
-    policy: Path
-    checkpoint: Path
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data for JSON."""
-        return {**asdict(self), "policy": str(self.policy), "checkpoint": str(self.checkpoint)}
-
-    def rows(self) -> Iterator[tuple[str, str]]:
-        """Write the figures for people."""
-        share = "no episode from the base" if self.success is None else f"{self.success:.0%}"
-        yield "success", f"{share} of the last episodes from the base, sampled actions"
-        if self.success_planned is not None:
-            yield "from elsewhere", f"{self.success_planned:.0%} of the last that began on a planned motion"
-        yield "steps", f"{self.steps}, {self.episodes} episodes"
-        yield "time", f"{self.seconds:.1f} s, {self.cpu_seconds:.1f} s of the processor"
-        yield "stopped", STOPPED[self.stopped]
-        yield "policy", str(self.policy)
-        yield "checkpoint", str(self.checkpoint)
 
 
 def train(
@@ -112,7 +49,7 @@ def train(
     Parameters
     ----------
     method : str
-        One of `METHODS`.
+        One of `METHODS`, or of `CLONING`, for which see `planners.rl.clone`.
     env_id : str
         A registered id.
     seed : int
@@ -124,7 +61,8 @@ def train(
     resume : bool
         Go on from the checkpoint in the folder, if there is one.
     env_kwargs : dict, optional
-        For the environment, after the settings' own.
+        For the environment, after the settings' own. Rewards, the time limit and what a collision does are
+        those of training alone: a policy is tested with the registered ones.
     stop_at : float
         Share of successful episodes, over 0; over 1 it is never reached.
     quiet : bool
@@ -143,6 +81,18 @@ def train(
         raise InputError(f"Expected a seed under 2**31, got {seed}.")
     if not (is_number(stop_at) and stop_at > 0.0):
         raise InputError(f"Expected a positive stop_at, got {stop_at!r}.")
+    if method in CLONING and settings is None:
+        return clone(
+            method,
+            env_id,
+            seed=seed,
+            steps=steps,
+            folder=folder,
+            resume=resume,
+            env_kwargs=env_kwargs,
+            stop_at=stop_at,
+            quiet=quiet,
+        )
     chosen = load_settings(method, env_id) if settings is None else settings
     if (chosen.method, chosen.env_id) != (method, env_id):
         raise InputError(
@@ -175,7 +125,7 @@ def _run(
     checkpoint = folder / CHECKPOINT
     task = json.loads(json.dumps({**asdict(settings), "seed": seed}))
     task.pop("n_timesteps")  # a resumed run may be longer
-    old = _old_progress(checkpoint, task, resume)
+    old = old_progress(checkpoint, task, resume)
     folder.mkdir(parents=True, exist_ok=True)
     if old is None:
         progress, model = Progress(), new_model(settings, envs, seed, folder)
@@ -195,29 +145,8 @@ def _run(
             watch.mark()
             keep(model)
         stopped = "learnt" if progress.learnt(stop_at) else "interrupted" if stop.asked else "steps"
-        return _finish(settings, seed, model, progress, stopped, folder)
-
-
-def _old_progress(checkpoint: Path, task: dict[str, Any], resume: bool) -> Progress | None:
-    """Return how far the folder's run has come, None for a new one; refuse another's checkpoint."""
-    if not checkpoint.exists():
-        return None
-    if not resume:
-        raise InputError(
-            f"Expected a folder without a run, but there is '{checkpoint}'; resume it, or move it."
-        )
-    old = read_progress(checkpoint)
-    try:
-        its, progress = dict(old["task"]), Progress(**old["progress"])
-    except (KeyError, TypeError, ValueError):
-        raise InputError(f"Expected a checkpoint of this version in '{checkpoint}', got another.") from None
-    for key, value in task.items():
-        if its.get(key) != value:
-            raise InputError(
-                f"Expected a run with {key}={value!r} to resume in '{checkpoint}', got one with "
-                f"{key}={its.get(key)!r}."
-            )
-    return progress
+        policy = NetworkPolicy.from_model(model, origin_of(settings, seed, progress.steps))
+        return write_run(settings, seed, policy, progress, stopped, folder)
 
 
 def _callback(watch: Watch) -> Any:
@@ -232,37 +161,3 @@ def _callback(watch: Watch) -> Any:
             return watch.step(self.num_timesteps, self.locals["dones"], self.locals["infos"])
 
     return Callback()
-
-
-def _finish(
-    settings: Settings, seed: int, model: Any, progress: Progress, stopped: str, folder: Path
-) -> TrainingRun:
-    """Write the policy and the record of the run."""
-    origin = Origin(
-        method=settings.method,
-        env_id=settings.env_id,
-        env_kwargs=settings.env_kwargs,
-        wrappers=settings.evaluation_wrappers,
-        seed=seed,
-        train_steps=progress.steps,
-        versions=Origin.installed_versions(),
-    )
-    NetworkPolicy.from_model(model, origin).save(folder / POLICY)
-    run = TrainingRun(
-        method=settings.method,
-        env_id=settings.env_id,
-        seed=seed,
-        steps=progress.steps,
-        episodes=progress.episodes,
-        success=progress.success,
-        success_planned=progress.success_planned,
-        stopped=stopped,
-        cpu_seconds=progress.cpu_seconds,
-        seconds=progress.seconds,
-        curve=tuple(map(tuple, progress.curve)),
-        policy=folder / POLICY,
-        checkpoint=folder / CHECKPOINT,
-    )
-    with replacing(folder / RUN) as part:
-        part.write_text(json.dumps(run.to_dict(), indent=1), encoding="utf-8")
-    return run
