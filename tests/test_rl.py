@@ -184,11 +184,20 @@ def test_a_replay_buffer_survives(tmp_path):
 def test_hindsight_goes_on_without_the_episodes_that_were_cut_off(tmp_path):
     settings = load_settings("tqc-her", STRAIGHT)
     runs = [
-        train("tqc-her", STRAIGHT, steps=steps, folder=tmp_path, quiet=True, settings=settings, resume=True)
-        for steps in (400, 4000)
+        train(
+            "tqc-her",
+            STRAIGHT,
+            steps=steps,
+            folder=tmp_path,
+            quiet=True,
+            settings=settings,
+            resume=True,
+            stop_at=2.0,
+        )
+        for steps in (400, 1600)
     ]
-    assert [run.steps for run in runs] == [400, 4000]
-    assert runs[1].episodes >= 4  # four environments, and 600 steps at most
+    assert runs[0].steps < runs[1].steps and runs[1].steps == pytest.approx(1600, abs=32)
+    assert runs[1].episodes >= 4 + runs[0].episodes
 
 
 def test_the_same_checkpoint_always_goes_on_in_the_same_way(tmp_path):
