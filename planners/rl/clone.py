@@ -49,8 +49,8 @@ ROUNDS, LEAST_STEPS = 10, 500
 NOISES = (0.0, 0.1, 0.3, 0.6)
 """Noise of an episode, in shares of the largest action: so the pupil sees how to come back.
 
-Measured in UTurn-I60: with it both methods pass all tests after 600 to 1300 steps of the environment. Without,
-DAgger takes about twice as many, and behaviour cloning never does, as all of its episodes are alike.
+Measured in UTurn-I60: with it both methods pass all tests after 600 to 1300 steps of the environment.
+Without, DAgger takes about twice as many, and behaviour cloning never does, as all of its episodes are alike.
 """
 
 BETA = 0.5
