@@ -34,8 +34,9 @@ OWN_STREAM = 1
 AT_GOAL = 1e-6
 """By so much of the goal's radius a start must be outside it, as simulated places are rounded."""
 
-LAST_PART = 0.1
-"""Starts that recede begin in this last part of the motion, and then in parts of this length."""
+LAST_PART = 0.03
+"""Starts that recede begin in this last part of the motion, and then in parts of this length. In tight mazes a
+learner that knows nothing yet must succeed from there before it collides."""
 
 PART_STARTS = 0.6
 """Share of the starts on the motion that are in the part to be learnt; the others are anywhere after it."""
@@ -43,7 +44,7 @@ PART_STARTS = 0.6
 PART_EPISODES, LEARNT, LOST = 8, 0.7, 0.1
 """After so many episodes from a part, starts recede if this share succeeded, and come back if only that."""
 
-RECEDE = 0.05
+RECEDE = 0.03
 """By this share of the motion starts recede; they come back by a third of it."""
 
 SLOWEST = 0.01

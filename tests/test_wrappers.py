@@ -97,11 +97,11 @@ def test_starts_that_recede_begin_near_the_goal_and_come_to_the_base_with_succes
     env = PlannedResets(gym.make(TIGHT), motion, share=1.0, recede=True)
     last = env.reset(seed=0) and env._start(1.0 - 1e-12)["waypoint"]
     places = receding_starts(env, 20, success=False)
-    assert places.min() > 0.88 * last
-    places = receding_starts(env, 600, success=True)
+    assert places.min() > 0.95 * last
+    places = receding_starts(env, 900, success=True)
     assert places[-100:].min() < 0.1 * last
     assert env.reset()[1]["receded"] == 1.0
-    in_part = places[-100:] < 0.11 * last
+    in_part = places[-100:] < 0.04 * last
     assert in_part.mean() == pytest.approx(0.6, abs=0.2)
 
 
@@ -110,7 +110,7 @@ def test_starts_that_recede_come_back_where_nothing_succeeds(motion):
     receding_starts(env, 100, success=True)
     there = env.reset()[1]["receded"]
     receding_starts(env, 60, success=False)
-    assert 0.1 <= env.reset()[1]["receded"] < there
+    assert 0.02 <= env.reset()[1]["receded"] < there
 
 
 def test_all_of_the_motion_is_drawn_from_unless_starts_recede(motion):

@@ -21,10 +21,6 @@ __all__ = ["MOST_LENGTHS", "run_planner"]
 SCAN = tuple(round(0.06 + 0.02 * k, 2) for k in range(48))
 """Indices that a scan tries, up to 1."""
 
-FAILURES = 6
-"""In a row, after a length that was solved, end a scan. Planners that fail with many short links and pass
-with few long ones are not cut off: before the first solved length nothing ends it."""
-
 FINEST = 0.002
 """To this a scan halves the step between the largest index that was solved and the next one."""
 
@@ -60,14 +56,13 @@ def warm_up(method: str) -> None:
 
 
 def _scan(cell: Cell) -> Iterator[dict[str, Any]]:
-    solved, failures, number = None, 0, 0
+    # All of them: some methods fail with middling links and pass with long ones.
+    solved, number = None, 0
     for index in SCAN:
         row = _guarded(cell, index, number)
         yield row
         number += 1
-        solved, failures = (index, 0) if row["solved"] else (solved, failures + 1)
-        if solved is not None and failures >= FAILURES:
-            break
+        solved = index if row["solved"] else solved
     if solved is None or solved == SCAN[-1]:
         return
     low, high = solved, SCAN[SCAN.index(solved) + 1]
