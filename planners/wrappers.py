@@ -35,8 +35,8 @@ AT_GOAL = 1e-6
 """By so much of the goal's radius a start must be outside it, as simulated places are rounded."""
 
 LAST_PART = 0.03
-"""Starts that recede begin in this last part of the motion, and then in parts of this length. In tight mazes a
-learner that knows nothing yet must succeed from there before it collides."""
+"""Starts that recede begin in this last part of the motion, and then in parts of this length. In tight mazes
+a learner that knows nothing yet must succeed from there before it collides."""
 
 PART_STARTS = 0.6
 """Share of the starts on the motion that are in the part to be learnt; the others are anywhere after it."""

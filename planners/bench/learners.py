@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -127,6 +128,7 @@ def _from_package(module: str, function: str, method: str) -> Learner:
         )
         file = Path(run.policy)
         policy = network.NetworkPolicy.load(file)
+        repeat = math.prod(arguments.get("repeat", 1) for _, arguments in policy.origin.wrappers)
 
         def test(episodes: int, first_seed: int, mean: bool) -> list[Mapping[str, Any]]:
             env_id = task.test_id or task.env_id
@@ -139,7 +141,7 @@ def _from_package(module: str, function: str, method: str) -> Learner:
             test=test,
             seconds=run.seconds,
             cpu_seconds=run.cpu_seconds,
-            train_steps=run.steps,
+            train_steps=run.steps * repeat,
             policy=file.read_bytes(),
         )
 
