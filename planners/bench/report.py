@@ -52,7 +52,7 @@ def write_report(folders: Sequence[Path], out: Path) -> list[Path]:
     out.mkdir(parents=True, exist_ok=True)
     sections = [
         _ran(rows, machines(folders)),
-        *(section(of_study(rows, study), out) for study, section in STUDIES.items() if of_study(rows, study)),
+        *(section(found, out) for study, section in STUDIES.items() if (found := _rows_of(rows, study))),
     ]
     pictures = [block.name for part in sections for block in part.blocks if isinstance(block, Picture)]
     page = html_page(TITLE, sections, {name: (out / name).read_bytes() for name in pictures})
@@ -60,6 +60,18 @@ def write_report(folders: Sequence[Path], out: Path) -> list[Path]:
         with replacing(out / name) as part:
             part.write_text(text, encoding="utf-8")
     return [out / name for name in ("report.md", "report.html", *pictures)]
+
+
+def _rows_of(rows: Sequence[Row], study: str) -> list[Row]:
+    """Return the rows of a study; over the index, learners that were trained for the ladder alone count too."""
+    found = of_study(rows, study)
+    if study != "index" or not found:
+        return found
+    known = {row["method"] for row in found}
+    ladder = of_study(rows, "ladder")
+    return found + [
+        row for row in ladder if row["shape"] in BENDS and is_learner(row) and row["method"] not in known
+    ]
 
 
 def _ran(rows: Sequence[Row], where: Sequence[str]) -> Section:
@@ -96,20 +108,22 @@ def _ladder(rows: Sequence[Row], out: Path) -> Section:
 
 def _index(rows: Sequence[Row], out: Path) -> Section:
     blocks: list[Table | Picture] = []
+    own = of_study(rows, "index")
     for shapes, name in ((BENDS, "index.png"), (SPACES, "index-spaces.png")):
-        here = {row["shape"] for row in rows}
+        here = {row["shape"] for row in own}
         if chosen := [shape for shape in shapes if shape in here]:
             draw_index(rows, chosen, out / name)
             text = (
                 f"Success (above) and median time of planners (below) over the index I: {', '.join(chosen)}. "
-                "White: not measured. Marks above the times: fewer than half of the runs succeed."
+                "Learners that were trained for the ladder alone are shown at its rungs. White: not measured. "
+                "Marks above the times: fewer than half of the runs succeed."
             )
             blocks.append(Picture(name=name, text=text))
-    if times := time_table(rows):
+    if times := time_table(own):
         blocks.append(times)
-    absent = [shape for shape in (*BENDS, *SPACES) if shape not in {row["shape"] for row in rows}]
-    said = [_missing(rows)] + ([f"Shapes not measured: {', '.join(absent)}."] if absent else [])
-    return Section(title="Over the index", text=said, blocks=[*blocks, *_learners(rows, out, "index")])
+    absent = [shape for shape in (*BENDS, *SPACES) if shape not in {row["shape"] for row in own}]
+    said = [_missing(own)] + ([f"Shapes not measured: {', '.join(absent)}."] if absent else [])
+    return Section(title="Over the index", text=said, blocks=[*blocks, *_learners(own, out, "index")])
 
 
 def _links(rows: Sequence[Row], out: Path) -> Section:
