@@ -63,7 +63,7 @@ def write_report(folders: Sequence[Path], out: Path) -> list[Path]:
 
 
 def _rows_of(rows: Sequence[Row], study: str) -> list[Row]:
-    """Return the rows of a study; over the index, learners that were trained for the ladder alone count too."""
+    """Return the rows of a study; over the index, with those of learners trained for the ladder alone."""
     found = of_study(rows, study)
     if study != "index" or not found:
         return found
@@ -115,7 +115,7 @@ def _index(rows: Sequence[Row], out: Path) -> Section:
             draw_index(rows, chosen, out / name)
             text = (
                 f"Success (above) and median time of planners (below) over the index I: {', '.join(chosen)}. "
-                "Learners that were trained for the ladder alone are shown at its rungs. White: not measured. "
+                "Learners trained for the ladder alone are shown at its rungs. White: not measured. "
                 "Marks above the times: fewer than half of the runs succeed."
             )
             blocks.append(Picture(name=name, text=text))
