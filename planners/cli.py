@@ -27,6 +27,7 @@ from planners.length_trials import motion_path
 from planners.planning import PLANNERS, TIME_BUDGET, plan
 from planners.problem import Motion, PlanningResult, Progress
 from planners.rl.settings import CLONING, FIRST_SEED, METHODS
+from planners.rl.shipped import POLICIES, policy_path
 from planners.validation import validate
 
 __all__ = ["app", "main"]
@@ -380,7 +381,10 @@ def train_command(
 
 @app.command("evaluate")
 def evaluate_command(
-    policy: Annotated[Path, typer.Argument(metavar="POLICY", help="A trained policy (.npz).")],
+    policy: Annotated[
+        str,
+        typer.Argument(metavar="POLICY", help=f"A trained policy (.npz), or one of: {', '.join(POLICIES)}."),
+    ],
     env: Annotated[
         str | None, typer.Option("--env", help="By default the environment that it was trained in.")
     ] = None,
@@ -399,7 +403,7 @@ def evaluate_command(
     from planners.rl.network import NetworkPolicy
 
     _check_output(replay, (".html",))
-    acting = NetworkPolicy.load(policy)
+    acting = NetworkPolicy.load(policy_path(policy))
     facts = evaluate_both(acting, env, episodes=episodes, seed=seed)
     if replay is not None:
         from hrsnake_env.replay import save_replay
