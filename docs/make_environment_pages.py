@@ -79,7 +79,9 @@ def picture(name: str) -> str:
     """Return the stem of an id's pictures; dense and sparse rewards share them."""
     arguments = ENVIRONMENTS[name]["kwargs"]
     maze = arguments.get("maze", "any")
-    return f"random-{arguments['split']}" if maze == "random" else str(maze)
+    if maze != "random":
+        return str(maze)
+    return f"random-{'long-' if 'n_links' in arguments else ''}{arguments['split']}"
 
 
 def pictures() -> dict[str, str]:
