@@ -151,9 +151,10 @@ def role(name: str) -> str:
     arguments = ENVIRONMENTS[name]["kwargs"]
     if arguments["maze"] != "random":
         return rung(name).role
+    bends = ", tight and with ten bends and more" if "difficulty" in arguments else ""
     if arguments["split"] == "train":
-        return "A new maze at every reset, to train on."
-    return f"{N_TASKS['test']} mazes to measure on; none of them is among those to train on."
+        return f"A new maze at every reset{bends}, to train on."
+    return f"{N_TASKS['test']} mazes{bends}, to measure on; none of them is among those to train on."
 
 
 def facts(name: str) -> list[tuple[str, str]]:
@@ -191,7 +192,8 @@ def longest_rod(name: str) -> str:
 def index(name: str) -> str:
     """Return the index of an id: link length over the longest rod."""
     if ENVIRONMENTS[name]["kwargs"].get("maze") == "random":
-        return f"{index_of_difficulty(0.0):.2g} to {index_of_difficulty(1.0):.2g}"
+        low, high = ENVIRONMENTS[name]["kwargs"].get("difficulty", (0.0, 1.0))
+        return f"{index_of_difficulty(low):.2g} to {index_of_difficulty(high):.2g}"
     return f"{made(name).unwrapped.arm.link_length / rung(name).longest_rod:.2f}"
 
 
