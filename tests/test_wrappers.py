@@ -11,7 +11,7 @@ from hrsnake_env import ArmSpec, InputError, Maze
 from hrsnake_env.ladder import LADDER
 from planners import plan
 from planners.motion_cache import MotionCache
-from planners.wrappers import ActionRepeat, PlannedResets, ResidualFollower, follow_the_leader
+from planners.wrappers import ActionRepeat, PlannedResets, ResidualFollower, StepCost, follow_the_leader
 
 TIGHT = "hrsnake_env:HyperRedundantMaze-UTurn-I80-v0"
 RANDOM = "hrsnake_env:HyperRedundantMaze-RandomTrain-v0"
@@ -133,6 +133,25 @@ def test_a_repeated_action_stops_where_the_episode_ends():
     steps = [env.step(np.zeros(6)) for _ in range(2)]
     assert [truncated for _, _, _, truncated, _ in steps] == [False, True]
     assert [info["total_steps"] for *_, info in steps] == [4, 6]
+
+
+def test_a_step_costs_in_rewards_that_are_given_and_in_those_that_are_replayed():
+    name = "hrsnake_env:HyperRedundantMaze-UTurn-I80-Sparse-v0"
+    bare, env = (gym.make(name, observation="goal") for _ in range(2))
+    env = StepCost(env, 0.25)
+    bare.reset(seed=0), env.reset(seed=0)
+    observation, reward, *_, info = bare.step(np.ones(6))
+    _, less, *_ = env.step(np.ones(6))
+    assert less == pytest.approx(reward - 0.25)
+    goal = observation["achieved_goal"]
+    replayed = bare.unwrapped.compute_reward(goal, goal, info)
+    assert env.compute_reward(goal, goal, info) == pytest.approx(replayed - 0.25)
+
+
+@pytest.mark.parametrize("cost", [-1.0, float("nan"), "1"])
+def test_a_cost_that_is_no_number_from_0_on_is_refused(cost):
+    with pytest.raises(InputError, match="cost"):
+        StepCost(gym.make(TIGHT), cost)
 
 
 @pytest.mark.parametrize("repeat", [0, -1, 1.5, "4"])
