@@ -9,7 +9,7 @@ from hrsnake_env.files import replacing
 from planners.bench.report_learners import learner_table
 from planners.bench.report_page import Picture, Section, Table, html_page, markdown_page
 from planners.bench.report_pictures import draw_index, draw_ladder, draw_links, draw_profiles
-from planners.bench.report_rows import Row, is_learner, ladder_order, machines, of_study, read_rows
+from planners.bench.report_rows import RANDOM, Row, is_learner, ladder_order, machines, of_study, read_rows
 from planners.bench.report_tables import below_table, ladder_tables, runs_in_words, tightest_table, time_table
 
 __all__ = ["write_report"]
@@ -63,14 +63,19 @@ def write_report(folders: Sequence[Path], out: Path) -> list[Path]:
 
 
 def _rows_of(rows: Sequence[Row], study: str) -> list[Row]:
-    """Return the rows of a study; over the index, with those of learners trained for the ladder alone."""
+    """Return the rows of a study; over the index, with those of learners trained for the ladder alone.
+
+    These stand at the study's nearest index, so that its columns stay whole.
+    """
     found = of_study(rows, study)
     if study != "index" or not found:
         return found
     known = {row["method"] for row in found}
-    ladder = of_study(rows, "ladder")
+    indices = {shape: sorted({row["index"] for row in found if row["shape"] == shape}) for shape in BENDS}
     return found + [
-        row for row in ladder if row["shape"] in BENDS and is_learner(row) and row["method"] not in known
+        {**row, "index": min(indices[row["shape"]], key=lambda index: abs(index - row["index"]))}
+        for row in of_study(rows, "ladder")
+        if indices.get(row["shape"]) and is_learner(row) and row["method"] not in {*known, RANDOM}
     ]
 
 
@@ -115,7 +120,7 @@ def _index(rows: Sequence[Row], out: Path) -> Section:
             draw_index(rows, chosen, out / name)
             text = (
                 f"Success (above) and median time of planners (below) over the index I: {', '.join(chosen)}. "
-                "Learners trained for the ladder alone are shown at its rungs. White: not measured. "
+                "Learners trained for the ladder alone are shown near its rungs. White: not measured. "
                 "Marks above the times: fewer than half of the runs succeed."
             )
             blocks.append(Picture(name=name, text=text))
