@@ -1,4 +1,4 @@
-"""The `hrsnake` command: plan, longest, validate, simulate, draw, demo, play, dataset, train, evaluate.
+"""The `hrsnake` command: plan, check, simulate, draw and play; train and evaluate; measure.
 
 Exit codes: 0 done; 2 bad input, one sentence on stderr; 3 no plan, a motion that is not valid, or a verdict
 that is not clean. `--json` prints one JSON object instead of tables.

@@ -41,7 +41,7 @@ def _command(study: str) -> Callable[..., None]:
             float | None, typer.Option("--budget", help="Seconds of each planning query.")
         ] = None,
         train_steps: Annotated[
-            int | None, typer.Option("--train-steps", help="Steps of each training.")
+            int | None, typer.Option("--train-steps", help="Decisions of each training.")
         ] = None,
         engine: Annotated[str, typer.Option("--engine", help="processes or ray.")] = "processes",
         address: Annotated[
@@ -62,8 +62,10 @@ def _command(study: str) -> Callable[..., None]:
         ] = False,
     ) -> None:
         from planners.bench import campaign
+        from planners.bench.engines import check_engine
         from planners.bench.studies import study_cells
 
+        check_engine(engine, workers, address)
         cells = study_cells(
             study,
             methods=_words(methods),

@@ -47,6 +47,9 @@ PART_EPISODES, LEARNT, LOST = 8, 0.7, 0.1
 RECEDE = 0.03
 """By this share of the motion starts recede; they come back by a third of it."""
 
+REPEAT = 4
+"""Steps to a decision by default."""
+
 SLOWEST = 0.01
 """The feed never waits with less than this share of its step."""
 
@@ -202,7 +205,7 @@ class ActionRepeat(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         If `repeat` is not a positive whole number.
     """
 
-    def __init__(self, env: gym.Env[Any, Any], repeat: int = 4) -> None:
+    def __init__(self, env: gym.Env[Any, Any], repeat: int = REPEAT) -> None:
         RecordConstructorArgs.__init__(self, repeat=repeat)
         gym.Wrapper.__init__(self, env)
         check_at_least("repeat", repeat, 1, whole=True)

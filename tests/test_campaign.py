@@ -18,7 +18,7 @@ from campaign_workers import ALWAYS, HANGS, N_CELLS, ONCE, cells_of, deadly, qui
 from hrsnake_env.errors import InputError
 from hrsnake_env.random_mazes import N_LINKS, random_maze
 from planners import cli
-from planners.bench import campaign, methods, planned
+from planners.bench import campaign, learners, methods, planned
 from planners.bench.campaign import run_cells
 from planners.bench.cells import Cell, CellResult
 from planners.bench.engines import DIED, HUNG, over_cells
@@ -177,6 +177,31 @@ def test_a_trained_policy_is_tested_by_mean_and_sampled_actions(monkeypatch):
         ("evaluated", 512, 3.0)
     }
     assert result.files == {".npz": b"weights"}
+
+
+def test_a_learner_is_tested_in_the_mazes_that_its_rows_name_and_planners_get(monkeypatch):
+    task = held_out_task("random", 3)
+    seen = []
+
+    def run(env, policy, seed, *, options, deterministic=True):
+        env.reset(seed=seed, options=options)
+        seen.append(env.unwrapped.maze.name)
+        return dict.fromkeys(MEASURED, 0)
+
+    monkeypatch.setattr(learners, "episode_facts", run)
+    rows = run_cell(cell_of(task, "random", episodes=3)).rows
+    assert [row["maze"] for row in rows] == seen == [task.problem(k).maze.name for k in range(3)]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [({"engine": "none"}, "Unknown engine"), ({"workers": 0}, "at least one"), ({"address": "a"}, "ray")],
+)
+def test_a_refused_engine_leaves_nothing_behind(tmp_path, options, said):
+    cells = [cell_of(rung_task("straight"))]
+    with pytest.raises(InputError, match=said):
+        run_cells(cells, tmp_path / "study", **options)
+    assert not (tmp_path / "study").exists()
 
 
 def test_a_training_that_fails_is_a_row_for_each_way_to_act(monkeypatch):

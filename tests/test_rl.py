@@ -17,8 +17,8 @@ import pytest
 from hrsnake_env import InputError, Maze
 from hrsnake_env.registration import ENVIRONMENTS
 from planners.cli import main
-from planners.rl.checkpoints import read_progress, write_checkpoint
-from planners.rl.environments import make_env
+from planners.rl.checkpoints import read_model, read_progress, write_checkpoint
+from planners.rl.environments import decision_steps, make_env
 from planners.rl.evaluate import FACTS, evaluate, evaluate_both, replayed, summary
 from planners.rl.models import new_model, vector
 from planners.rl.network import NetworkPolicy, Origin
@@ -436,6 +436,8 @@ BAD_SETTINGS = [
     (GOOD + ", policy_kwargs: {depth: 3}}", "Unknown policy_kwargs 'depth' for 'default'"),
     (GOOD + ", learning_rate: 3e-4}", "Expected learning_rate for 'default' in 's.yml' as a positive number"),
     (GOOD + ", env_wrapper: os.system}", "Unknown env_wrapper 'os.system' for 'default'"),
+    (GOOD + ", env_wrapper: [[1]]}", "Unknown env_wrapper [1] for 'default'"),
+    (GOOD + ", gamma: x}", "Expected gamma for 'default' in 's.yml' as a number, got 'x'."),
     ("default: !!python/object:os.system {}", "got a file that is not YAML."),
 ]
 
@@ -530,3 +532,20 @@ def test_wrappers_and_arguments_that_are_unknown_are_refused():
         make_env(STRAIGHT, wrappers=(("os.system", {}),))
     with pytest.raises(InputError, match="Expected arguments that HyperRedundantMaze-Straight-v0 has"):
         make_env(STRAIGHT, env_kwargs={"colour": "red"})
+
+
+def test_a_decision_takes_the_wrappers_own_number_of_steps_unless_told():
+    repeat = "planners.wrappers.ActionRepeat"
+    assert [decision_steps(wrappers) for wrappers in ((), ((repeat, {}),), ((repeat, {"repeat": 8}),))] == [
+        1,
+        4,
+        8,
+    ]
+
+
+def test_a_checkpoint_that_cannot_be_read_gets_one_sentence(tmp_path):
+    path = tmp_path / "checkpoint.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("something", "else")
+    with pytest.raises(InputError, match="Expected a checkpoint that can be read"):
+        read_model(path, lambda file: file)

@@ -14,11 +14,11 @@ from typing import Any
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
 from planners.bench.cells import Cell, CellResult, Run
-from planners.bench.engines import over_cells
+from planners.bench.engines import check_engine, over_cells
 from planners.bench.methods import run_cell
 from planners.bench.pool import bar
 from planners.bench.records import machine, write_results
-from planners.bench.rows import read_rows, sorted_rows, write_rows
+from planners.bench.rows import check_pyarrow, read_rows, sorted_rows, write_rows
 
 __all__ = ["ROWS", "StudyRun", "remaining", "run_cells", "worst_hours"]
 
@@ -99,6 +99,8 @@ def run_cells(
     InputError
         If the folder holds another study, or a package that the engine or the files need is missing.
     """
+    check_engine(engine, workers, address)
+    check_pyarrow()
     folder = _opened(cells[0].study, out)
     left = remaining(cells, out, retry_errors=retry_errors)
     if left:

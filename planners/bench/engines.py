@@ -61,16 +61,21 @@ def over_cells(
     InputError
         If there is no such engine, Ray is not installed, or its cluster cannot be reached.
     """
+    check_engine(engine, workers, address)
+    if engine == "ray":
+        _check_reachable(address)
+        return _over_ray(cells, run, workers, address)
+    return _over_processes(cells, run, workers or os.cpu_count() or 1)
+
+
+def check_engine(engine: str, workers: int | None, address: str | None) -> None:
+    """Refuse an engine that there is not, and what does not suit it."""
     if engine not in ENGINES:
         raise InputError(f"Unknown engine {engine!r}. Available: {', '.join(ENGINES)}.")
     if address is not None and engine != "ray":
         raise InputError(f"Expected an address for the engine 'ray' alone, got one for '{engine}'.")
     if workers is not None and workers < 1:
         raise InputError(f"Expected at least one worker, got {workers}.")
-    if engine == "ray":
-        _check_reachable(address)
-        return _over_ray(cells, run, workers, address)
-    return _over_processes(cells, run, workers or os.cpu_count() or 1)
 
 
 # Processes

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import importlib
-import math
 import tempfile
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,8 @@ import gymnasium as gym
 from planners.bench.cells import EVERY_ACTIONS, Cell, CellResult, row_of
 from planners.bench.episodes import MEASURED, RandomPolicy
 from planners.bench.planned import warm_up
-from planners.bench.tasks import Task, known_maze
+from planners.bench.tasks import Problem, Task, known_maze
+from planners.rl.environments import decision_steps
 from planners.rollout import episode_facts
 
 __all__ = ["LEARNERS", "Learner", "Trained", "run_learner", "run_random"]
@@ -58,13 +59,13 @@ def run_learner(cell: Cell) -> CellResult:
     _warm_up(cell.task)
     with tempfile.TemporaryDirectory() as folder:
         trained = LEARNERS[cell.method](cell.task, cell.seed, int(cell.budget), Path(folder))
-    problem, rows = cell.task.problem(0), []
+    rows = []
     for actions in EVERY_ACTIONS:
         tested = trained.test(cell.episodes, TEST_SEED, actions == "mean")
         rows += [
             row_of(
                 cell,
-                problem,
+                _problem(cell.task, number),
                 number,
                 actions=actions,
                 status="evaluated",
@@ -92,13 +93,13 @@ def run_random(cell: Cell) -> CellResult:
     """Test a policy that draws every action evenly; nothing is trained."""
     known_maze(cell.task)
     env = gym.make(f"hrsnake_env:{cell.task.test_id or cell.task.env_id}", **cell.task.env_kwargs)
-    policy, problem, rows = RandomPolicy(env, cell.seed), cell.task.problem(0), []
+    policy, rows = RandomPolicy(env, cell.seed), []
     for number in range(cell.episodes):
-        facts = episode_facts(env, policy, TEST_SEED + number)
+        facts = episode_facts(env, policy, TEST_SEED + number, options=_options(cell.task, number))
         rows.append(
             row_of(
                 cell,
-                problem,
+                _problem(cell.task, number),
                 number,
                 actions="sampled",
                 status="evaluated",
@@ -110,13 +111,23 @@ def run_random(cell: Cell) -> CellResult:
     return CellResult(rows=rows)
 
 
+def _problem(task: Task, number: int) -> Problem:
+    """Return the problem of an episode: in a family both have the same number, as for planners."""
+    return task.problem(number if task.n_mazes > 1 else 0)
+
+
+def _options(task: Task, number: int) -> dict[str, Any] | None:
+    """Return the reset options of an episode."""
+    return {"task_id": number} if task.n_mazes > 1 else None
+
+
 def _from_package(module: str, function: str, method: str) -> Learner:
     """Return a learner of `planners.rl`, which is imported when it is asked."""
 
     def learn(task: Task, seed: int, steps: int, folder: Path) -> Trained:
         network: Any = importlib.import_module("planners.rl.network")
         train: Any = getattr(importlib.import_module(f"planners.rl.{module}"), function)
-        evaluate: Any = importlib.import_module("planners.rl.evaluate").evaluate
+        make_env: Any = importlib.import_module("planners.rl.environments").make_env
         run = train(
             method,
             task.env_id,
@@ -128,20 +139,25 @@ def _from_package(module: str, function: str, method: str) -> Learner:
         )
         file = Path(run.policy)
         policy = network.NetworkPolicy.load(file)
-        repeat = math.prod(arguments.get("repeat", 1) for _, arguments in policy.origin.wrappers)
+        wrappers = policy.origin.wrappers
+        kwargs = {**policy.origin.env_kwargs, **task.env_kwargs}  # with the task's own time limit
 
         def test(episodes: int, first_seed: int, mean: bool) -> list[Mapping[str, Any]]:
-            env_id = task.test_id or task.env_id
-            found: list[Mapping[str, Any]] = evaluate(
-                policy, env_id, episodes=episodes, seed=first_seed, deterministic=mean
-            )
+            env = make_env(task.test_id or task.env_id, env_kwargs=kwargs, wrappers=wrappers)
+            found: list[Mapping[str, Any]] = []
+            with closing(env):
+                for number in range(episodes):
+                    policy.reseed(first_seed + number)
+                    options = _options(task, number)
+                    seed = first_seed + number
+                    found.append(episode_facts(env, policy, seed, options=options, deterministic=mean))
             return found
 
         return Trained(
             test=test,
             seconds=run.seconds,
             cpu_seconds=run.cpu_seconds,
-            train_steps=run.steps * repeat,
+            train_steps=run.steps * decision_steps(wrappers),
             policy=file.read_bytes(),
         )
 

@@ -10,7 +10,16 @@ from typing import Any
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
 
-__all__ = ["COLUMNS", "ORDER", "TIMES", "read_rows", "sorted_rows", "whole_row", "write_rows"]
+__all__ = [
+    "COLUMNS",
+    "ORDER",
+    "TIMES",
+    "check_pyarrow",
+    "read_rows",
+    "sorted_rows",
+    "whole_row",
+    "write_rows",
+]
 
 COLUMNS: dict[str, str] = {
     "study": "string",
@@ -112,7 +121,7 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     """
     arrow, parquet = _pyarrow()
     try:
-        # Without Arrow's threads: they may abort the process at its end (apache/arrow#34314, #50482).
+        # Without Arrow's threads: they may abort the process at its end.
         file = parquet.ParquetFile(arrow.BufferReader(path.read_bytes()))
         table = file.read(use_threads=False)
     except arrow.ArrowInvalid:
@@ -121,6 +130,11 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
         raise InputError(f"Expected the columns of a benchmark's rows in '{path}', got others.")
     rows: list[dict[str, Any]] = table.to_pylist()
     return rows
+
+
+def check_pyarrow() -> None:
+    """Raise InputError if pyarrow is not installed."""
+    _pyarrow()
 
 
 def _pyarrow() -> tuple[Any, Any]:

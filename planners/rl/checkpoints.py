@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import pickle
 import warnings
 import zipfile
 from collections.abc import Callable
@@ -59,6 +60,13 @@ def read_progress(path: Path) -> dict[str, Any]:
         raise InputError(f"Expected a checkpoint (.zip) in '{path}', got a file that is not one.") from None
 
 
+UNREADABLE = (
+    *(AttributeError, EOFError, ImportError, KeyError, OSError, TypeError, ValueError),
+    *(pickle.UnpicklingError, zipfile.BadZipFile),
+)
+"""What comes of a file that holds something else, or was written with other versions."""
+
+
 def read_model(path: Path, load: Callable[[io.BytesIO], Any]) -> Any:
     """Read the model of a checkpoint; it is pickled, so read your own files alone.
 
@@ -73,12 +81,20 @@ def read_model(path: Path, load: Callable[[io.BytesIO], Any]) -> Any:
     -------
     model : stable_baselines3 model
         With its replay buffer.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, as one of another version.
     """
-    with zipfile.ZipFile(path) as archive:
-        model = load(io.BytesIO(archive.read(MODEL)))
-        if BUFFER in archive.namelist():
-            with warnings.catch_warnings():
-                # Episodes begin anew, and so hindsight has to cut off those that were running.
-                warnings.filterwarnings("ignore", message="The last trajectory in the replay buffer")
-                model.load_replay_buffer(io.BytesIO(archive.read(BUFFER)))
+    try:
+        with zipfile.ZipFile(path) as archive:
+            model = load(io.BytesIO(archive.read(MODEL)))
+            if BUFFER in archive.namelist():
+                with warnings.catch_warnings():
+                    # Episodes begin anew, and so hindsight has to cut off those that were running.
+                    warnings.filterwarnings("ignore", message="The last trajectory in the replay buffer")
+                    model.load_replay_buffer(io.BytesIO(archive.read(BUFFER)))
+    except UNREADABLE as error:
+        raise InputError(f"Expected a checkpoint that can be read in '{path}', got: {error}.") from None
     return model

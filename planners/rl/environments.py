@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Any
 
 import gymnasium as gym
@@ -10,9 +11,17 @@ import gymnasium as gym
 import hrsnake_env
 from hrsnake_env.errors import InputError
 from hrsnake_env.registration import ENVIRONMENTS
-from planners.wrappers import ActionRepeat, PlannedResets, ResidualFollower, StepCost
+from planners.wrappers import REPEAT, ActionRepeat, PlannedResets, ResidualFollower, StepCost
 
-__all__ = ["TRAINING_KWARGS", "TRAINING_ONLY", "WRAPPERS", "Wrappers", "check_env_id", "make_env"]
+__all__ = [
+    "TRAINING_KWARGS",
+    "TRAINING_ONLY",
+    "WRAPPERS",
+    "Wrappers",
+    "check_env_id",
+    "decision_steps",
+    "make_env",
+]
 
 Wrappers = tuple[tuple[str, dict[str, Any]], ...]
 """Names with arguments, innermost first."""
@@ -36,6 +45,14 @@ TRAINING_KWARGS = (
     "terminate_on_collision",
 )
 """Arguments that make practice easier or shorter: an evaluation has the registered ones."""
+
+
+def decision_steps(wrappers: Wrappers) -> int:
+    """Return how many steps of the environment a decision takes."""
+    repeats = (
+        arguments.get("repeat", REPEAT) for name, arguments in wrappers if WRAPPERS[name] is ActionRepeat
+    )
+    return math.prod(int(repeat) for repeat in repeats)
 
 
 def check_env_id(env_id: str) -> None:

@@ -88,6 +88,7 @@ def evaluate_both(
     facts : dict
         What `evaluate` returns, under "mean" and "sampled".
     """
+    check_at_least("episodes", episodes, 1, whole=True)
     env = policy.make_env(env_id)
     try:
         first = evaluate(policy, episodes=1, seed=seed, env=env)

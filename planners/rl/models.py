@@ -13,7 +13,7 @@ import numpy as np
 
 from hrsnake_env.errors import InputError
 from planners.rl.checkpoints import read_model
-from planners.rl.environments import make_env
+from planners.rl.environments import decision_steps, make_env
 from planners.rl.settings import Settings
 
 __all__ = ["learners", "new_model", "resumed_model", "vector"]
@@ -65,7 +65,7 @@ def new_model(settings: Settings, envs: Any, seed: int, folder: Path) -> Any:
             arguments["replay_buffer_class"]
         ]
         # Hindsight takes whole episodes alone: one must have ended before the first is drawn.
-        limit = envs.get_attr("spec")[0].max_episode_steps / settings.repeat
+        limit = envs.get_attr("spec")[0].max_episode_steps / decision_steps(settings.wrappers)
         least = settings.n_envs * math.ceil(limit)
         arguments["learning_starts"] = max(arguments.get("learning_starts", 0), least)
     try:

@@ -35,7 +35,8 @@ class TrainingRun:
     method, env_id, seed
         What was trained.
     steps, episodes : int
-        Of all environments together, over all resumed runs.
+        Decisions (several steps of the environment each with `ActionRepeat`) and episodes of all environments
+        together, over all resumed runs.
     success : float or None
         Share of the last 100 episodes that began at the base, with actions sampled as in training; of
         imitation, of the test episodes after the last round.

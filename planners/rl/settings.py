@@ -79,6 +79,13 @@ ARGUMENTS = {
 OWN_KEYS = ("n_timesteps", "n_envs", "policy", "env_wrapper", "env_kwargs")
 """What RL Zoo, and this package, make of an entry themselves."""
 
+NUMBERS = (
+    *("batch_size", "buffer_size", "gae_lambda", "gamma", "gradient_steps", "learning_starts"),
+    *("max_grad_norm", "n_epochs", "n_steps", "target_kl", "target_update_interval", "tau"),
+    *("top_quantiles_to_drop_per_net", "vf_coef"),
+)
+"""What must be a number in a file."""
+
 POLICIES = ("MlpPolicy", "MultiInputPolicy")
 
 BUFFERS = ("HerReplayBuffer",)
@@ -138,12 +145,6 @@ class Settings:
     def evaluation_kwargs(self) -> dict[str, Any]:
         """The environment's arguments without those that only training has."""
         return {key: value for key, value in self.env_kwargs.items() if key not in TRAINING_KWARGS}
-
-    @property
-    def repeat(self) -> int:
-        """Steps of the environment to a decision of the learner."""
-        repeats = (entry[1].get("repeat", 1) for entry in self.wrappers)
-        return math.prod(int(repeat) for repeat in repeats)
 
 
 def settings_file(method: str) -> Path:
@@ -226,6 +227,9 @@ def _settings(path: Path, method: str, name: str, entry: Any) -> Settings:
             check_at_least(f"{key} {where}", entry.get(key), 1, whole=True)
     for key in SCHEDULES:
         _check_schedule(f"{key} {where}", entry.get(key, 0.1))
+    for key, value in entry.items():
+        if key in NUMBERS and not is_number(value):
+            raise InputError(f"Expected {key} {where} as a number, got {value!r}.")
     if entry.get("replay_buffer_class", BUFFERS[0]) not in BUFFERS:
         raise InputError(
             f"Unknown replay_buffer_class {entry['replay_buffer_class']!r} {where}. "
@@ -261,7 +265,8 @@ def _wrappers(where: str, value: Any) -> Wrappers:
     wrappers: list[tuple[str, dict[str, Any]]] = []
     for item in items:
         pairs = list(item.items()) if isinstance(item, dict) else [(item, {})]
-        if len(pairs) != 1 or pairs[0][0] not in WRAPPERS or not isinstance(pairs[0][1], dict):
+        named = len(pairs) == 1 and isinstance(pairs[0][0], str) and pairs[0][0] in WRAPPERS
+        if not named or not isinstance(pairs[0][1], dict):
             raise InputError(f"Unknown env_wrapper {item!r} {where}. Available: {', '.join(WRAPPERS)}.")
         wrappers.append(pairs[0])
     return tuple(wrappers)
