@@ -14,7 +14,7 @@ STARTS, HEADINGS, SAMPLES = 48, 16, 48
 """Starts and headings of a link, and points on it, that are looked at: enough to name a wall."""
 
 
-def wall_nearest_to(maze: Maze, place: tuple[float, float]) -> int:
+def wall_nearest_to(maze: Maze, place: tuple[float, ...]) -> int:
     """Return the index in `Maze.walls` of the wall nearest to a place."""
     return int(np.argmin(shapely.distance(shapely.linestrings(maze.walls), shapely.points(place))))
 

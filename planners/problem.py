@@ -8,10 +8,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
-from typing import Any
+from typing import IO, Any, Generic, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from hrsnake_env.arm import FloatArray, configuration_from_joints, joints_from_configuration
 from hrsnake_env.errors import InputError
@@ -27,7 +27,10 @@ __all__ = [
     "PlanningResult",
     "PlanningStatus",
     "Progress",
+    "Result",
     "ValidationReport",
+    "read_motion_arrays",
+    "write_motion_arrays",
 ]
 
 Progress = Callable[[str, float], None]
@@ -134,14 +137,7 @@ class Motion:
         The keys are `joints`, `joint_angles`, `feed`, `link_length` and `base_pose`.
         """
         with replacing(path) as part, part.open("wb") as file:
-            np.savez_compressed(
-                file,
-                joints=self.joints,
-                joint_angles=self.joint_angles,
-                feed=self.feed,
-                link_length=np.asarray(self.link_length),
-                base_pose=self.base_pose,
-            )
+            write_motion_arrays(file, self)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Motion:
@@ -152,26 +148,7 @@ class Motion:
         InputError
             If the file is missing or does not hold a motion.
         """
-        try:
-            with open(path, "rb") as file:
-                data = np.load(file, allow_pickle=False)
-                if not isinstance(data, np.lib.npyio.NpzFile):
-                    raise InputError(f"Expected a motion (.npz) in '{path}', got a single array.")
-                missing = [key for key in KEYS if key not in data]
-                if missing:
-                    raise InputError(
-                        f"Expected a motion in '{path}' with the keys {', '.join(KEYS)}; "
-                        f"missing: {', '.join(missing)}."
-                    )
-                values = {key: data[key] for key in KEYS}
-        except FileNotFoundError:
-            raise InputError(f"Expected a motion file at '{path}', but there is none.") from None
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"Expected a motion (.npz) in '{path}', got a file that is not one.") from None
-        if any(values[key].dtype.kind not in "fiu" for key in KEYS) or values["link_length"].size != 1:
-            raise InputError(f"Expected a motion of numbers in '{path}', with one link_length.")
+        values = read_motion_arrays(path)
         link_length = float(values.pop("link_length").item())
         return cls(link_length=link_length, **values)
 
@@ -210,6 +187,43 @@ class Motion:
         return Motion.from_configurations(self.feed, joint_angles, self.link_length, self.base_pose)
 
 
+def write_motion_arrays(file: IO[bytes], motion: object) -> None:
+    """Write the attributes `KEYS` of a motion as `.npz`."""
+    arrays: dict[str, Any] = {key: np.asarray(getattr(motion, key)) for key in KEYS}
+    np.savez_compressed(file, **arrays)
+
+
+def read_motion_arrays(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
+    """Read the arrays `KEYS` of a motion file (.npz).
+
+    Raises
+    ------
+    InputError
+        If the file is missing or does not hold a motion.
+    """
+    try:
+        with open(path, "rb") as file:
+            data = np.load(file, allow_pickle=False)
+            if not isinstance(data, np.lib.npyio.NpzFile):
+                raise InputError(f"Expected a motion (.npz) in '{path}', got a single array.")
+            missing = [key for key in KEYS if key not in data]
+            if missing:
+                raise InputError(
+                    f"Expected a motion in '{path}' with the keys {', '.join(KEYS)}; "
+                    f"missing: {', '.join(missing)}."
+                )
+            values = {key: data[key] for key in KEYS}
+    except FileNotFoundError:
+        raise InputError(f"Expected a motion file at '{path}', but there is none.") from None
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"Expected a motion (.npz) in '{path}', got a file that is not one.") from None
+    if any(values[key].dtype.kind not in "fiu" for key in KEYS) or values["link_length"].size != 1:
+        raise InputError(f"Expected a motion of numbers in '{path}', with one link_length.")
+    return values
+
+
 @dataclass(frozen=True, kw_only=True)
 class Fault:
     """Name one thing that is wrong with a motion, at its worst place.
@@ -224,8 +238,8 @@ class Fault:
         Index of the pose, or of the pose before the place between two poses.
     link : int or None
         Index of the link, from the base end.
-    place : tuple of two floats, or None
-        In maze units.
+    place : tuple of floats, or None
+        In maze units; x, y and in space z.
     amount : float
         How much, in maze units (rad for joint limits).
     """
@@ -234,7 +248,7 @@ class Fault:
     message: str
     pose: int
     link: int | None
-    place: tuple[float, float] | None
+    place: tuple[float, ...] | None
     amount: float
 
 
@@ -292,8 +306,8 @@ class Failure:
 
     Parameters
     ----------
-    place : tuple of two floats
-        Where, in maze units.
+    place : tuple of floats
+        Where, in maze units; x, y and in space z.
     path_position : float or None
         Arclength along the path up to there.
     link : int or None
@@ -302,11 +316,11 @@ class Failure:
         Index in `Maze.walls` of the wall that is most in its way.
     depth : float or None
         How deep the link would be in that wall where the planner wants it, in maze units.
-    joints : array, shape (n_joints, 2), or None
+    joints : array, shape (n_joints, 2 or 3), or None
         The arm as far as it came, from the base to the tip, for a picture.
     """
 
-    place: tuple[float, float]
+    place: tuple[float, ...]
     path_position: float | None = None
     link: int | None = None
     wall: int | None = None
@@ -361,9 +375,22 @@ class Attempt:
         return f"{self.planner}{way}: {self.status}"
 
 
+class _Poses(Protocol):
+    """What a result tells of its motion."""
+
+    @property
+    def n_poses(self) -> int: ...
+
+    @property
+    def n_links(self) -> int: ...
+
+
+AnyMotion = TypeVar("AnyMotion", bound=_Poses)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PlanningResult:
-    """Hold what a planner found, or why it found nothing.
+class Result(Generic[AnyMotion]):
+    """Hold what a planner found, or why it found nothing; in the plane or in space.
 
     Parameters
     ----------
@@ -389,7 +416,7 @@ class PlanningResult:
 
     status: PlanningStatus
     planner: str
-    motion: Motion | None = None
+    motion: AnyMotion | None = None
     reason: str = ""
     failure: Failure | None = None
     longest_there: float | None = None
@@ -401,7 +428,7 @@ class PlanningResult:
         object.__setattr__(self, "timings", MappingProxyType(dict(self.timings)))
 
     @property
-    def place(self) -> tuple[float, float] | None:
+    def place(self) -> tuple[float, ...] | None:
         """Where planning ended, in maze units."""
         return None if self.failure is None else self.failure.place
 
@@ -427,3 +454,7 @@ class PlanningResult:
             "attempts": [str(attempt) for attempt in self.attempts],
             "timings": dict(self.timings),
         }
+
+
+class PlanningResult(Result[Motion]):
+    """Hold what a planner found in a maze, or why it found nothing; see `Result`."""

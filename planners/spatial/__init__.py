@@ -1,0 +1,1 @@
+"""The same in three dimensions: workspaces of boxes, path following, and the joint track in space."""
