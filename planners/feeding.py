@@ -41,17 +41,17 @@ class Feeding:
 
     Parameters
     ----------
-    poses : array, shape (n_poses, n_links + 1, 2)
+    poses : array, shape (n_poses, n_links + 1, 2 or 3)
         As far as it went; the tip last.
     ending : int
         One of DONE, JUMP, FULL and MEETS of `planners.kernels.feeding`.
-    place : tuple of two floats
+    place : tuple of two or three floats
         Where the tip was at the end, in maze units.
     """
 
     poses: FloatArray
     ending: int
-    place: tuple[float, float]
+    place: tuple[float, ...]
 
 
 def feed(
@@ -61,56 +61,54 @@ def feed(
     step: float = STEP,
     walls: FloatArray | None = None,
 ) -> Feeding:
-    """Feed an arm along a track.
+    """Feed an arm along a track, in the plane or in space.
 
     Parameters
     ----------
-    track : array, shape (n, 2)
+    track : array, shape (n, 2 or 3)
         A polyline in maze units that begins at the base and is straight for one link length.
     link_length : float
         In maze units.
-    base_pose : array, shape (3,)
+    base_pose : array, shape (3,) or, in space, (6,)
         Base position and heading.
     step : float
         Largest movement of a joint between poses, in link lengths.
     walls : array, shape (n_walls, 2, 2), or None
-        Segments, in maze units; if given, feeding ends at the first pose that meets one of them or itself.
-        That is before the first pose if chords that end at points of the track do.
+        Segments, in maze units, in the plane alone; if given, feeding ends at the first pose that meets one of
+        them or itself. That is before the first pose if chords that end at points of the track do.
     """
     track, arc = _subdivided(track, link_length)
     sweep = UNCHECKED
     if walls is not None:
         free, sweep = sweep_chords(track, arc, link_length, walls)
         if not free:
-            return Feeding(poses=np.empty((0, 0, 2)), ending=kernel.MEETS, place=(track[0, 0], track[0, 1]))
+            return Feeding(poses=np.empty((0, 0, 2)), ending=kernel.MEETS, place=tuple(track[0].tolist()))
     n_links = kernel.links_at_end(track, arc, link_length)
     if n_links < 0:
         n_links = math.floor(arc[-1] / link_length) + 2
     room = POSES_PER_LINK * n_links
     while True:
-        poses = np.empty((room, n_links + 1, 2))
-        n, ending, x, y = kernel.feed_along(
-            track, arc, link_length, base_pose, step * link_length, sweep, poses
-        )
+        poses = np.empty((room, n_links + 1, track.shape[1]))
+        n, ending = kernel.feed_along(track, arc, link_length, base_pose, step * link_length, sweep, poses)
         if ending != kernel.FULL or room >= MOST_POSES_PER_LINK * n_links:
             break
         room = min(4 * room, MOST_POSES_PER_LINK * n_links)
     poses = poses[:n]
     # Links that never leave the feeder are not needed: those behind the base at the end.
-    cos, sin = math.cos(base_pose[2]), math.sin(base_pose[2])
-    offset = poses[-1] - base_pose[:2]
-    inside = (offset @ (cos, sin) <= 1e-9 * link_length) & (
-        np.abs(offset @ (-sin, cos)) <= 1e-9 * link_length
-    )
+    base, heading = kernel.feeder_axis(base_pose)
+    offset = poses[-1] - base
+    along = offset @ heading
+    aside = np.linalg.norm(offset - along[:, None] * heading, axis=1)
+    inside = (along <= 1e-9 * link_length) & (aside <= 1e-9 * link_length)
     unused = int(np.argmin(inside[1:]))
-    return Feeding(poses=poses[:, unused:], ending=ending, place=(x, y))
+    return Feeding(poses=poses[:, unused:], ending=ending, place=tuple(poses[-1, -1].tolist()))
 
 
 def _subdivided(track: FloatArray, link_length: float) -> tuple[FloatArray, FloatArray]:
     """Return the same polyline without segments of no length or over a quarter link, and its arclength."""
-    sizes = np.hypot(*np.diff(track, axis=0).T)
+    sizes = np.linalg.norm(np.diff(track, axis=0), axis=1)
     track = track[np.concatenate([[True], sizes > 1e-9 * link_length])]
-    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(track, axis=0).T))])
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(track, axis=0), axis=1))])
     parts = np.ceil(np.diff(arc) / (0.25 * link_length)).astype(np.int64)
     index = np.append(np.repeat(np.arange(len(parts)), parts), len(parts))
     first = np.concatenate([[0], np.cumsum(parts)])

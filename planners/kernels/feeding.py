@@ -1,4 +1,7 @@
-"""Kernels of feeding: poses of an arm whose joints all run on one polyline, and their exact check."""
+"""Kernels of feeding: poses of an arm whose joints all run on one polyline, and their exact check.
+
+Feeding is the same in the plane and in space; the check is for the plane.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +23,13 @@ RELEASED = 1e-10
 """How near to the end of the straight part a joint is just there, in link lengths."""
 
 
+@njit(cache=True, inline="always")
+def _put(track: FloatArray, along: FloatArray, k: int, t: float, row: int, joints: FloatArray) -> None:
+    """Put a joint on segment k of the track, a way t from its start."""
+    for c in range(track.shape[1]):
+        joints[row, c] = track[k, c] + t * along[k, c]
+
+
 @njit(cache=True)
 def _place_arm(
     track: FloatArray, along: FloatArray, arc: FloatArray, tip: float, length: float, segment: IntArray,
@@ -37,31 +47,39 @@ def _place_arm(
         k += 1
     while k > 0 and arc[k] > tip:
         k -= 1
-    t = tip - arc[k]
-    x, y = track[k, 0] + t * along[k, 0], track[k, 1] + t * along[k, 1]
-    new_segment[0], place[0], joints[end, 0], joints[end, 1] = k, tip, x, y
+    _put(track, along, k, tip - arc[k], end, joints)
+    new_segment[0], place[0] = k, tip
     n, at = 0, tip
     while at > length * (1.0 + 1e-12):
         if n == end:
             return -1
-        k, t = start_of_link(track, along, x, y, squared, min(segment[n + 1], k), k)
+        k, t = start_of_link(track, along, joints, end - n, squared, min(segment[n + 1], k), k)
         if k < 0:
             return -1
         n += 1
         at = arc[k] + t
-        x, y = track[k, 0] + t * along[k, 0], track[k, 1] + t * along[k, 1]
-        new_segment[n], place[n], joints[end - n, 0], joints[end - n, 1] = k, at, x, y
+        _put(track, along, k, t, end - n, joints)
+        new_segment[n], place[n] = k, at
     return n
 
 
 @njit(cache=True)
-def _put_behind(n: int, place: float, length: float, base_pose: FloatArray, joints: FloatArray) -> None:
+def feeder_axis(base_pose: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return base point and unit heading of a base pose in the plane, shape (3,), or in space, (6,)."""
+    if base_pose.shape[0] == 6:
+        return base_pose[:3], base_pose[3:]
+    return base_pose[:2], np.array([np.cos(base_pose[2]), np.sin(base_pose[2])])
+
+
+@njit(cache=True)
+def _put_behind(
+    n: int, place: float, length: float, base: FloatArray, heading: FloatArray, joints: FloatArray
+) -> None:
     """Put joint n, at arclength `place` of the straight part, and those behind it on the axis."""
-    cos, sin, end = np.cos(base_pose[2]), np.sin(base_pose[2]), joints.shape[0] - 1
+    end = joints.shape[0] - 1
     for k in range(n, joints.shape[0]):
-        along = place - (k - n) * length
-        joints[end - k, 0] = base_pose[0] + along * cos
-        joints[end - k, 1] = base_pose[1] + along * sin
+        for c in range(joints.shape[1]):
+            joints[end - k, c] = base[c] + (place - (k - n) * length) * heading[c]
 
 
 @njit(cache=True)
@@ -91,24 +109,33 @@ def _tip_at_release(
 
 
 @njit(cache=True)
+def _squared_distance(points: FloatArray, k: int, others: FloatArray, row: int) -> float:
+    total = 0.0
+    for c in range(points.shape[1]):
+        total += (points[k, c] - others[row, c]) ** 2
+    return total
+
+
+@njit(cache=True)
 def _releases(track: FloatArray, along: FloatArray, arc: FloatArray, length: float) -> FloatArray:
     """Return the tip's places at which a joint comes to the end of the straight part, the track's end last.
 
     These are link ends in a row from there on. Where the track comes back to a link's start there are more.
     """
-    n_segments = arc.shape[0] - 1
-    found = np.empty(int(arc[n_segments] / length) + 2)
-    x, y, n, k, t = track[0, 0], track[0, 1], 0, 0, 0.0
+    n_segments, squared = arc.shape[0] - 1, length * length
+    found, at = np.empty(int(arc[n_segments] / length) + 2), track[:1].copy()
+    n, k = 0, 0
     while True:
-        while k < n_segments and (track[k + 1, 0] - x) ** 2 + (track[k + 1, 1] - y) ** 2 < length * length:
+        while k < n_segments and _squared_distance(track, k + 1, at, 0) < squared:
             k += 1
         if k == n_segments:
             found[n] = arc[n_segments]
             return found[: n + 1]
-        ax, ay = track[k, 0] - x, track[k, 1] - y
-        half = ax * along[k, 0] + ay * along[k, 1]
-        t = -half + np.sqrt(max(half * half - ax * ax - ay * ay + length * length, 0.0))
-        x, y = track[k, 0] + t * along[k, 0], track[k, 1] + t * along[k, 1]
+        half = 0.0
+        for c in range(track.shape[1]):
+            half += (track[k, c] - at[0, c]) * along[k, c]
+        t = -half + np.sqrt(max(half * half - _squared_distance(track, k, at, 0) + squared, 0.0))
+        _put(track, along, k, t, 0, at)
         found[n] = min(arc[k] + t, arc[n_segments])
         n += 1
 
@@ -117,30 +144,28 @@ def _releases(track: FloatArray, along: FloatArray, arc: FloatArray, length: flo
 def feed_along(
     track: FloatArray, arc: FloatArray, length: float, base_pose: FloatArray, step: float, sweep: Sweep,
     poses: FloatArray,
-) -> tuple[int, int, float, float]:  # fmt: skip
+) -> tuple[int, int]:  # fmt: skip
     """Feed an arm along a track, pose by pose; no joint moves farther than `step` between two.
 
     Parameters
     ----------
-    track : array, shape (n, 2)
+    track : array, shape (n, 2 or 3)
         Begins at the base and is straight along the base heading for one link length.
     arc : array, shape (n,)
         Its arclength; strictly increasing.
     length, step : float
         In maze units.
-    base_pose : array, shape (3,)
+    base_pose : array, shape (3,) or, in space, (6,)
         Base position and heading.
     sweep : Sweep
-        What chords of the track may meet; with empty arrays nothing is looked at.
-    poses : array, shape (n_max, n_joints, 2)
+        What chords of the track may meet; with empty arrays, as always in space, nothing is looked at.
+    poses : array, shape (n_max, n_joints, 2 or 3)
         Filled with the joints of each pose, the tip last.
 
     Returns
     -------
     n_poses, ending : int
         Number of poses, and one of DONE, JUMP, FULL and MEETS.
-    x, y : float
-        The tip's place at the end.
 
     Notes
     -----
@@ -148,17 +173,18 @@ def feed_along(
     its other end at the base, is never stepped over: the feeder's rule needs it.
     """
     n_joints, end = poses.shape[1], poses.shape[1] - 1
+    base, heading = feeder_axis(base_pose)
     segments, places = np.zeros((2, n_joints), dtype=np.int64), np.zeros((2, n_joints))
     along = directions(track, arc)
     releases, next_release = _releases(track, along, arc, length), 0
     total, checked = arc[arc.shape[0] - 1], sweep.low.shape[0] > 0
     links = np.empty(n_joints, dtype=np.int64)
-    _put_behind(0, 0.0, length, base_pose, poses[0])
+    _put_behind(0, 0.0, length, base, heading, poses[0])
     placed, tip, stride, n_poses, old = 0, 0.0, step, 1, 0
     while tip < total:
         now = poses[n_poses - 1]
         if n_poses == poses.shape[0]:
-            return n_poses, FULL, now[end, 0], now[end, 1]
+            return n_poses, FULL
         new, segment, place = poses[n_poses], segments[old], places[old]
         new_segment, new_place = segments[1 - old], places[1 - old]
         while next_release + 1 < releases.shape[0] and releases[next_release] <= tip:
@@ -174,23 +200,22 @@ def feed_along(
                 new_segment, new_place, new,
             )  # fmt: skip
             if at <= tip + 1e-12 * length:  # the joint comes out of the straight part with a jump
-                return n_poses, JUMP, now[end, 0], now[end, 1]
+                return n_poses, JUMP
             n = _place_arm(track, along, arc, at, length, segment, new_segment, new_place, new)
         moved = np.inf
         if n >= 0 and abs(n - placed) <= 1:
-            _put_behind(n, new_place[n], length, base_pose, new)
+            _put_behind(n, new_place[n], length, base, heading, new)
             moved = 0.0
             for k in range(end - max(n, placed), n_joints):
-                dx, dy = new[k, 0] - now[k, 0], new[k, 1] - now[k, 1]
-                moved = max(moved, dx * dx + dy * dy)
+                moved = max(moved, _squared_distance(new, k, now, k))
             moved = np.sqrt(moved)
         if moved > step * (1.0 + 1e-9):
             stride = (at - tip) * min(max(0.9 * step / moved, 0.1), 0.9)
             if stride < SMALLEST * length:
-                return n_poses, JUMP, now[end, 0], now[end, 1]
+                return n_poses, JUMP
             continue
         if checked and not _is_free(n, new_segment, new_place, base_pose, sweep, links, poses, n_poses):
-            return n_poses, MEETS, now[end, 0], now[end, 1]
+            return n_poses, MEETS
         wanted = (at - tip) * min(2.0, 0.97 * step / max(moved, 1e-300))
         # After a short step to a release the stride of before is still right.
         stride = min(step, max(wanted, stride * min(1.0, 0.97 * step / max(moved, 1e-300))), 2.0 * stride)
@@ -199,8 +224,7 @@ def feed_along(
             new_segment[k], new_place[k] = 0, 0.0
         placed, tip, old = n, at, 1 - old
         n_poses += 1
-    now = poses[n_poses - 1]
-    return n_poses, DONE, now[end, 0], now[end, 1]
+    return n_poses, DONE
 
 
 @njit(cache=True)
@@ -208,13 +232,13 @@ def links_at_end(track: FloatArray, arc: FloatArray, length: float) -> int:
     """Return how many links a tip at the track's end needs, one in the feeder; -1 if it jumps."""
     along, squared = directions(track, arc), length * length
     k, at, n = arc.shape[0] - 2, arc[arc.shape[0] - 1], 0
-    x, y = track[k + 1, 0], track[k + 1, 1]
+    joint = track[k + 1 : k + 2].copy()
     while at > length * (1.0 + 1e-12):
-        k, t = start_of_link(track, along, x, y, squared, k, k)
+        k, t = start_of_link(track, along, joint, 0, squared, k, k)
         if k < 0:
             return -1
         n, at = n + 1, arc[k] + t
-        x, y = track[k, 0] + t * along[k, 0], track[k, 1] + t * along[k, 1]
+        _put(track, along, k, t, 0, joint)
     return n + 1
 
 

@@ -41,44 +41,50 @@ class Sweep(NamedTuple):
 
 @njit(cache=True, inline="always")
 def start_of_link(
-    track: FloatArray, along: FloatArray, x: float, y: float, squared: float, segment: int, last: int
+    track: FloatArray, along: FloatArray, ends: FloatArray, row: int, squared: float, segment: int, last: int
 ) -> tuple[int, float]:
-    """Find the place on the track one link length from (x, y), from an earlier one on: segment, way on it.
+    """Find the place on the track one link length from `ends[row]`: segment, and way on it.
 
-    Segment -1 is nowhere: the axis behind the track, or beyond the segment `last`.
+    In the plane and in space, from an earlier segment on. Segment -1 is nowhere: the axis behind the track, or beyond the segment `last`.
     """
-    k = segment
-    ax, ay = track[k, 0] - x, track[k, 1] - y
-    size = ax * ax + ay * ay
+    k, d = segment, track.shape[1]
+    size, next_size, half = 0.0, 0.0, 0.0
+    for c in range(d):
+        size += (track[k, c] - ends[row, c]) ** 2
     if size < squared:
         while size < squared:
             k -= 1
             if k < 0:
                 return -1, 0.0
-            ax, ay = track[k, 0] - x, track[k, 1] - y
-            size = ax * ax + ay * ay
+            size = 0.0
+            for c in range(d):
+                size += (track[k, c] - ends[row, c]) ** 2
     else:
         while True:
-            bx, by = track[k + 1, 0] - x, track[k + 1, 1] - y
-            next_size = bx * bx + by * by
+            next_size = 0.0
+            for c in range(d):
+                next_size += (track[k + 1, c] - ends[row, c]) ** 2
             if next_size < squared:
                 break
             k += 1
             if k > last:
                 return -1, 0.0
-            ax, ay, size = bx, by, next_size
-    half = ax * along[k, 0] + ay * along[k, 1]
+            size = next_size
+    for c in range(d):
+        half += (track[k, c] - ends[row, c]) * along[k, c]
     return k, max(-half - np.sqrt(max(half * half - size + squared, 0.0)), 0.0)
 
 
 @njit(cache=True)
 def directions(track: FloatArray, arc: FloatArray) -> FloatArray:
-    """Return the unit vectors along the segments of a track, shape (n_segments, 2)."""
-    along = np.empty((arc.shape[0] - 1, 2))
+    """Return the unit vectors along the segments of a track, shape (n_segments, 2 or 3)."""
+    along = np.empty((arc.shape[0] - 1, track.shape[1]))
     for k in range(along.shape[0]):
-        size = np.hypot(track[k + 1, 0] - track[k, 0], track[k + 1, 1] - track[k, 1])
-        along[k, 0] = (track[k + 1, 0] - track[k, 0]) / size
-        along[k, 1] = (track[k + 1, 1] - track[k, 1]) / size
+        squared = 0.0
+        for c in range(track.shape[1]):
+            squared += (track[k + 1, c] - track[k, c]) ** 2
+        for c in range(track.shape[1]):
+            along[k, c] = (track[k + 1, c] - track[k, c]) / np.sqrt(squared)
     return along
 
 
@@ -136,7 +142,7 @@ def _middle_chords(
     k, from_place, begin = 0, 0.0, length
     for j in range(first, n_segments):
         seen = k
-        k, t = start_of_link(track, along, track[j + 1, 0], track[j + 1, 1], squared, k, j)
+        k, t = start_of_link(track, along, track, j + 1, squared, k, j)
         if k < 0:
             low[j:], high[j:], middle[j:] = 0.0, -1.0, 0.0
             return first
