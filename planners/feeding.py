@@ -74,8 +74,8 @@ def feed(
     step : float
         Largest movement of a joint between poses, in link lengths.
     walls : array, shape (n_walls, 2, 2), or None
-        Segments, in maze units, in the plane alone; if given, feeding ends at the first pose that meets one of
-        them or itself. That is before the first pose if chords that end at points of the track do.
+        Segments, in maze units, in the plane alone; if given, feeding ends at the first pose that meets one
+        of them or itself. That is before the first pose if chords that end at points of the track do.
     """
     track, arc = _subdivided(track, link_length)
     sweep = UNCHECKED

@@ -45,7 +45,8 @@ def start_of_link(
 ) -> tuple[int, float]:
     """Find the place on the track one link length from `ends[row]`: segment, and way on it.
 
-    In the plane and in space, from an earlier segment on. Segment -1 is nowhere: the axis behind the track, or beyond the segment `last`.
+    In the plane and in space, from an earlier segment on. Segment -1 is nowhere: the axis behind the track,
+    or beyond the segment `last`.
     """
     k, d = segment, track.shape[1]
     size, next_size, half = 0.0, 0.0, 0.0

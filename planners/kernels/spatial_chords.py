@@ -1,0 +1,68 @@
+"""Kernel of the mapping error: how far the chords of a path are from it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from planners.kernels.types import FloatArray
+
+PARTS = 40
+"""Into how many parts a link is cut."""
+
+
+@njit(cache=True)
+def _from_segment(
+    px: float, py: float, pz: float, ax: float, ay: float, az: float, bx: float, by: float, bz: float
+) -> float:
+    """Return the squared distance of a point p from the segment a-b."""
+    ex, ey, ez = bx - ax, by - ay, bz - az
+    size = max(ex * ex + ey * ey + ez * ez, 1e-300)
+    t = min(max(((px - ax) * ex + (py - ay) * ey + (pz - az) * ez) / size, 0.0), 1.0)
+    return (px - ax - t * ex) ** 2 + (py - ay - t * ey) ** 2 + (pz - az - t * ez) ** 2
+
+
+@njit(cache=True)
+def chord_errors(points: FloatArray, length: float) -> tuple[float, float]:
+    """Return how far chords get from the stretch of path that they span, and that from them.
+
+    Parameters
+    ----------
+    points : array, shape (n, 3)
+        The path. Chords end at all its points that are a chord or more from its start.
+    length : float
+        Of a chord.
+    """
+    link_to_path, path_to_link, k = 0.0, 0.0, 0
+    for i in range(1, points.shape[0]):
+        apart = 0.0
+        for c in range(3):
+            apart += (points[0, c] - points[i, c]) ** 2
+        if k == 0 and apart < length * length:
+            continue
+        while k + 1 < i:
+            apart = 0.0
+            for c in range(3):
+                apart += (points[k + 1, c] - points[i, c]) ** 2
+            if apart < length * length:
+                break
+            k += 1
+        ax, ay, az = points[k, 0], points[k, 1], points[k, 2]
+        bx, by, bz = points[i, 0], points[i, 1], points[i, 2]
+        for j in range(k, i + 1):
+            far = _from_segment(points[j, 0], points[j, 1], points[j, 2], ax, ay, az, bx, by, bz)
+            path_to_link = max(path_to_link, far)
+        for part in range(1, PARTS):
+            t = part / PARTS
+            px, py, pz = ax + t * (bx - ax), ay + t * (by - ay), az + t * (bz - az)
+            least = np.inf
+            for j in range(k, i):
+                least = min(
+                    least,
+                    _from_segment(
+                        px, py, pz, points[j, 0], points[j, 1], points[j, 2],
+                        points[j + 1, 0], points[j + 1, 1], points[j + 1, 2],
+                    ),
+                )  # fmt: skip
+            link_to_path = max(link_to_path, least)
+    return np.sqrt(link_to_path), np.sqrt(path_to_link)

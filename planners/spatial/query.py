@@ -1,0 +1,87 @@
+"""What a spatial planner is asked: a workspace, an arm, a time limit; and the path, found once."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from hrsnake_env.arm import ArmSpec, FloatArray
+from planners.problem import Progress, ValidationReport
+from planners.spatial.path import Path, global_path
+from planners.spatial.potential import laplace_potential
+from planners.spatial.problem import SpatialMotion
+from planners.spatial.workspace import Workspace
+
+__all__ = ["SpatialQuery"]
+
+FIRST = 0.5
+"""Share of the link length with which chords on the path begin to grow."""
+
+
+@dataclass(eq=False, kw_only=True)
+class SpatialQuery:
+    """Hold a question to a spatial planner.
+
+    Parameters
+    ----------
+    workspace, arm
+        What is asked.
+    deadline : float
+        On the clock of `time.perf_counter`.
+    check : callable
+        The exact checker.
+    warm_start : tuple of array, shape (n, 3), and float; or None
+        The track of links of another length, from the base to the goal, and that length.
+    progress : callable or None
+        Called with stage and share done.
+    """
+
+    workspace: Workspace
+    arm: ArmSpec
+    deadline: float
+    check: Callable[[SpatialMotion], ValidationReport]
+    warm_start: tuple[FloatArray, float] | None = None
+    progress: Progress | None = None
+    timings: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def late(self) -> bool:
+        """Whether time is over."""
+        return time.perf_counter() > self.deadline
+
+    @cached_property
+    def path(self) -> Path | None:
+        """The path of a ball of the link radius; None if there is no way on the grid."""
+        self.tell("path", 0.0)
+        start = time.perf_counter()
+        potential = laplace_potential(self.workspace, radius=self.arm.link_radius)
+        middle = time.perf_counter()
+        path = None if potential is None else global_path(self.workspace, potential)
+        self.timings |= {"potential": middle - start, "path": time.perf_counter() - middle}
+        self.tell("path", 1.0)
+        return path
+
+    @property
+    def start(self) -> tuple[FloatArray, float]:
+        """Return the curve from the end of the straight stretch to the goal from which chords grow, and their length.
+
+        There must be a path or a warm start.
+        """
+        curve, length = (
+            self.warm_start if self.warm_start is not None else (None, FIRST * self.arm.link_length)
+        )
+        if curve is None:
+            assert self.path is not None
+            curve = self.path.points
+        begin = self.workspace.base + self.workspace.straight * self.workspace.heading
+        behind = int(np.argmin(np.linalg.norm(curve - begin, axis=1)))
+        return np.concatenate([begin[None], curve[behind + 1 :]]), length
+
+    def tell(self, stage: str, share: float) -> None:
+        """Report progress."""
+        if self.progress is not None:
+            self.progress(stage, share)

@@ -1,0 +1,210 @@
+"""The joint track in space: one curve, shaped until every link on it is free of every obstacle.
+
+Links that run on a curve are chords of it. The planner starts from the path of the point robot with chords so
+short that they are free, and lets them grow to the length of the links. Whatever chord is in an obstacle is
+pushed out of it by the smallest translation that separates the two, and takes the curve with it as a lever
+(`planners.kernels.spatial_track`). As chords grow by little at a time each push is small, and the curve stays
+on its side of every edge. Then the curve is sampled more finely, and the arm is fed along it.
+
+The smallest translation is across a face of the box or across one of its edges. That pushes across edges are
+among them is what makes the edge of a window act as a corner does in the plane.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hrsnake_env.arm import FloatArray
+from planners.feeding import Feeding, feed
+from planners.kernels import feeding as feeding_kernel
+from planners.kernels import spatial_track as kernel
+from planners.path import arclength, resampled
+from planners.problem import Failure, PlanningStatus
+from planners.spatial.problem import SpatialCandidate, SpatialMotion
+from planners.spatial.query import SpatialQuery
+from planners.spatial.workspace import Workspace
+
+__all__ = ["Track", "plan_track", "track_from_curve"]
+
+COARSE, FINE = 15, (30, 60)
+"""Samples per link while chords grow, and then."""
+
+STAGES = ((0.3, 100), (0.03, 50), (0.003, 50))
+"""Smoothing and number of iterations: strong smoothing takes slack and cusps out of the track and leaves a
+residual, which weaker smoothing takes away."""
+
+DEEP = 0.01
+"""Depth, in link lengths, that is left where no chord is free: the arm is not even fed then."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """Say how carefully a track is shaped.
+
+    Parameters
+    ----------
+    margin : float
+        Kept from obstacles beyond the link radius, in link lengths.
+    steps : int
+        In how many steps chords grow.
+    strict : float
+        Share of the joint limit that is kept.
+    """
+
+    margin: float
+    steps: int
+    strict: float = 0.99
+
+
+EFFORTS = (
+    Effort(margin=0.003, steps=6),
+    Effort(margin=0.003, steps=20, strict=0.97),
+    Effort(margin=0.0015, steps=40),
+)
+"""What is tried, one after the other, until the exact checker agrees."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Track:
+    """Hold a joint track while it is shaped.
+
+    Parameters
+    ----------
+    points : array, shape (n, 3)
+        Samples in workspace units. The first `fixed` lie on the axis of the feeder.
+    fixed : int
+        At least 2.
+    """
+
+    points: FloatArray
+    fixed: int
+
+    @property
+    def free(self) -> FloatArray:
+        """The part behind the straight stretch, with the end of that, shape (m, 3)."""
+        return self.points[self.fixed - 1 :]
+
+
+def track_from_curve(workspace: Workspace, curve: FloatArray, length: float, per_link: int) -> Track:
+    """Sample a curve, shape (n, 3), from the end of the straight stretch to the goal, for links of a length."""
+    start = workspace.base + workspace.straight * workspace.heading
+    free = resampled(curve, length / per_link)
+    axis = start + np.linspace(-length, 0.0, per_link + 1)[:, None] * workspace.heading
+    return Track(points=np.concatenate([axis, free[1:]]), fixed=per_link + 1)
+
+
+def plan_track(query: SpatialQuery) -> SpatialCandidate:
+    """Plan by a joint track; if it comes with a motion that the exact checker refuses, all efforts failed."""
+    if query.warm_start is None and query.path is None:
+        return SpatialCandidate(
+            status=PlanningStatus.NO_PATH,
+            reason="No way from the base to the goal was found, not even for the path of a ball of the links' radius.",
+        )
+    best = SpatialCandidate(
+        status=PlanningStatus.OUT_OF_TIME, reason="Time was over before a track was shaped."
+    )
+    for effort in EFFORTS:
+        candidate = _attempt(query, effort)
+        if candidate is None:  # time is over
+            break
+        if candidate.motion is not None and query.check(candidate.motion).valid:
+            return candidate
+        if best.motion is None:
+            best = candidate
+    return best
+
+
+def _attempt(query: SpatialQuery, effort: Effort) -> SpatialCandidate | None:
+    """Shape a track and feed the arm along it; None if time runs out."""
+    begin = time.perf_counter()
+    shaped = _shaped(query, effort)
+    shaping = time.perf_counter() - begin
+    query.timings["plan"] = query.timings.get("plan", 0.0) + shaping
+    if shaped is None:
+        return None
+    track, depth = shaped
+    workspace, arm = query.workspace, query.arm
+    if depth > DEEP * arm.link_length:
+        return _dead_end(query, track)
+    begin = time.perf_counter()
+    base_pose = workspace.base_pose_for(arm.link_length)
+    curve = np.concatenate([base_pose[None, :3], track.free])
+    fed = feed(curve, arm.link_length, base_pose)
+    motion = None
+    if fed.ending == feeding_kernel.DONE:
+        motion = SpatialMotion.from_joints(fed.poses, arm.link_length, base_pose)
+    query.timings["poses"] = query.timings.get("poses", 0.0) + time.perf_counter() - begin
+    if motion is None:
+        return _jumps(query, fed)
+    return SpatialCandidate(status=PlanningStatus.SOLVED, motion=motion, track=curve)
+
+
+def _shaped(query: SpatialQuery, effort: Effort) -> tuple[Track, float] | None:
+    """Shape a track; return it with the depth that is left, or None if time runs out."""
+    workspace, arm = query.workspace, query.arm
+    boxes = workspace.obstacles.copy()
+    boxes[:, 0] -= arm.link_radius + effort.margin * arm.link_length
+    boxes[:, 1] += arm.link_radius + effort.margin * arm.link_length
+    limit = math.pi if arm.joint_limit is None else effort.strict * arm.joint_limit
+    curve, first = query.start
+    lengths = np.geomspace(first, arm.link_length, effort.steps + 1)
+    plan = [(length, COARSE) for length in lengths] + [(arm.link_length, per_link) for per_link in FINE]
+    depth = 0.0
+    for number, (length, per_link) in enumerate(plan):
+        query.tell("plan", number / len(plan))
+        track = track_from_curve(workspace, curve, length, per_link)
+        for smoothing, iterations in STAGES:
+            if query.late:
+                return None
+            depth = kernel.relax(track.points, track.fixed, length, limit, boxes, smoothing, iterations)
+        curve = track.free
+    query.tell("plan", 1.0)
+    return track, depth
+
+
+def _dead_end(query: SpatialQuery, track: Track) -> SpatialCandidate:
+    """Say which chord is deepest in an obstacle."""
+    length, units = query.arm.link_length, query.workspace.units
+    obstacles = query.workspace.obstacles
+    tip, rear, wall, depth = kernel.deepest_chord(track.points, track.fixed, length, obstacles)
+    place = tuple(track.points[tip].tolist())
+    low, high = obstacles[wall]
+    return SpatialCandidate(
+        status=PlanningStatus.DEAD_END,
+        track=track.points,
+        reason=(
+            f"No track was found on which links of {length:g} {units} are free: the link that ends at "
+            f"{place_text(place)} is {depth:.3g} {units} deep in the obstacle from {place_text(low)} to "
+            f"{place_text(high)}."
+        ),
+        failure=Failure(
+            place=place,
+            path_position=float(arclength(track.free)[max(tip - track.fixed + 1, 0)])
+            + query.workspace.straight,
+            wall=int(wall),
+            depth=float(depth),
+            joints=np.stack([rear, track.points[tip]]),
+        ),
+    )
+
+
+def _jumps(query: SpatialQuery, fed: Feeding) -> SpatialCandidate:
+    """Say where a joint would have to jump."""
+    return SpatialCandidate(
+        status=PlanningStatus.DEAD_END,
+        reason=(
+            f"With the tip at {place_text(fed.place)} a joint would have to jump: the track turns across the "
+            f"link of {query.arm.link_length:g} {query.workspace.units} that starts there."
+        ),
+        failure=Failure(place=fed.place, joints=fed.poses[-1]),
+    )
+
+
+def place_text(place: Sequence[float] | FloatArray) -> str:
+    """Write a place as (x, y, z)."""
+    return "(" + ", ".join(f"{value:.4g}" for value in place) + ")"
