@@ -82,15 +82,15 @@ def descend(maze: Maze, potential: Potential) -> FloatArray | None:
 
 
 def arclength(points: FloatArray) -> FloatArray:
-    """Compute the arclength at each point of a polyline, shape (n, 2) -> (n,), from 0."""
-    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    """Compute the arclength at each point of a polyline, shape (n, dimension) -> (n,), from 0."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot.reduce(np.diff(points, axis=0), axis=1))])
 
 
 def resampled(points: FloatArray, spacing: float) -> FloatArray:
     """Place points evenly on a polyline, at most `spacing` apart; both ends stay."""
     s = arclength(points)
     places = np.linspace(0.0, s[-1], max(int(np.ceil(s[-1] / spacing)), 2) + 1)
-    return np.column_stack([np.interp(places, s, points[:, k]) for k in range(2)])
+    return np.column_stack([np.interp(places, s, column) for column in points.T])
 
 
 def windowed(points: FloatArray, window: int) -> FloatArray:
@@ -98,26 +98,26 @@ def windowed(points: FloatArray, window: int) -> FloatArray:
 
     Parameters
     ----------
-    points : array, shape (n, 2)
-        In maze units.
+    points : array, shape (n, dimension)
+        In any units.
     window : int
         At least 0.
 
     Returns
     -------
-    smooth : array, shape (n, 2)
+    smooth : array, shape (n, dimension)
         The first and the last point stay where they are.
     """
     index = np.arange(len(points))
     half = np.minimum(np.minimum(index, index[::-1]), window)
-    sums = np.concatenate([np.zeros((1, 2)), np.cumsum(points, axis=0)])
+    sums = np.concatenate([np.zeros((1, points.shape[1])), np.cumsum(points, axis=0)])
     return np.asarray((sums[index + half + 1] - sums[index - half]) / (2 * half + 1)[:, None])
 
 
 def tangents(points: FloatArray) -> FloatArray:
-    """Compute unit tangents, shape (n, 2), from the chord between the neighbours of each point."""
+    """Compute unit tangents, shape (n, dimension), from the chord between the neighbours of each point."""
     chords = np.gradient(points, axis=0)
-    return np.asarray(chords / np.hypot(chords[:, 0], chords[:, 1])[:, None])
+    return np.asarray(chords / np.hypot.reduce(chords, axis=1)[:, None])
 
 
 def curvature(points: FloatArray, span: int = CURVATURE_SPAN) -> FloatArray:
