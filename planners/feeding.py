@@ -12,7 +12,7 @@ from planners.kernels.feeding_sweep import Sweep, sweep_chords
 from planners.kernels.types import FloatArray
 from planners.problem import Motion
 
-__all__ = ["Feeding", "feed", "motion_along", "motion_of"]
+__all__ = ["STEP", "Feeding", "feed", "motion_along", "motion_of"]
 
 STEP = 0.03
 """Largest movement of a joint between poses, in link lengths."""

@@ -1,4 +1,4 @@
-"""Kernel of the mapping error: how far the chords of a path are from it."""
+"""Kernels of path following: joints on a path, and how far its chords are from it."""
 
 from __future__ import annotations
 
@@ -66,3 +66,63 @@ def chord_errors(points: FloatArray, length: float) -> tuple[float, float]:
                 )  # fmt: skip
             link_to_path = max(link_to_path, least)
     return np.sqrt(link_to_path), np.sqrt(path_to_link)
+
+
+@njit(cache=True)
+def place_on_path(
+    points: FloatArray,
+    arc: FloatArray,
+    length: float,
+    tips: FloatArray,
+    base_pose: FloatArray,
+    poses: FloatArray,
+) -> None:
+    """Put all joints on a path, for each place of the tip: each at the nearest place behind the one ahead.
+
+    Parameters
+    ----------
+    points : array, shape (n, 3)
+        The path. It begins at the base; behind it joints are on the axis.
+    arc : array, shape (n,)
+        Its arclength, strictly increasing.
+    length : float
+        Of a link.
+    tips : array, shape (n_poses,)
+        Arclengths, increasing.
+    base_pose : array, shape (6,)
+        Position and unit heading of the base.
+    poses : array, shape (n_poses, n_joints, 3)
+        Filled, the tip last.
+    """
+    squared, last = length * length, poses.shape[1] - 1
+    for p in range(tips.shape[0]):
+        k = min(max(np.searchsorted(arc, tips[p]) - 1, 0), arc.shape[0] - 2)
+        share = (tips[p] - arc[k]) / (arc[k + 1] - arc[k])
+        for c in range(3):
+            poses[p, last, c] = points[k, c] + share * (points[k + 1, c] - points[k, c])
+        for j in range(last - 1, -1, -1):
+            while k >= 0:
+                apart = 0.0
+                for c in range(3):
+                    apart += (points[k, c] - poses[p, j + 1, c]) ** 2
+                if apart >= squared:
+                    break
+                k -= 1
+            half, size, apart = 0.0, 0.0, 0.0
+            if k < 0:
+                for c in range(3):  # on the axis: base + t heading, with t at most 0
+                    way = base_pose[c] - poses[p, j + 1, c]
+                    half += way * base_pose[3 + c]
+                    apart += way * way
+                t = -half - np.sqrt(max(half * half - apart + squared, 0.0))
+                for c in range(3):
+                    poses[p, j, c] = base_pose[c] + t * base_pose[3 + c]
+                continue
+            for c in range(3):  # between samples k and k + 1, the latter nearer than a link
+                step, way = points[k + 1, c] - points[k, c], points[k, c] - poses[p, j + 1, c]
+                size += step * step
+                half += step * way
+                apart += way * way
+            t = (-half - np.sqrt(max(half * half - size * (apart - squared), 0.0))) / size
+            for c in range(3):
+                poses[p, j, c] = points[k, c] + t * (points[k + 1, c] - points[k, c])

@@ -1,9 +1,9 @@
 """Kernels of the spatial track planner: a joint track shaped until every chord of it is free.
 
 The track is a list of samples. The first `fixed` lie on the feeder's axis, from one link length behind the
-end of the straight stretch to that end, and never move; neither does the last, the goal. A chord is a link on
-the track. Chords are looked at from each sample backwards and, so that the front end is not skipped over where
-the rear end hardly moves, from each sample forwards.
+end of the straight stretch to that end, and never move; neither does the last, the goal. A chord is a link
+on the track. Chords are looked at from each sample backwards and, so that the front end is not skipped over
+where the rear end hardly moves, from each sample forwards.
 """
 
 from __future__ import annotations
@@ -20,6 +20,12 @@ RELAXATION = 0.8
 
 PARALLEL = 1e-3
 """A chord that rises by less than this share of its length over a face touches it with all of its length."""
+
+LEAST_SLOPE = 0.1
+"""Smallest cosine between a chord and the track at its rear end that is asked for."""
+
+SPAN = 4
+"""Samples on each side that turn the track."""
 
 SKEW = 1e-6
 """No direction across a chord and an edge is looked for if they are this near to parallel."""
@@ -189,11 +195,10 @@ def _push_chord(
 
 @njit(cache=True)
 def _squared(points: FloatArray, i: int, k: int) -> float:
-    return float(
-        (points[k, 0] - points[i, 0]) ** 2
-        + (points[k, 1] - points[i, 1]) ** 2
-        + (points[k, 2] - points[i, 2]) ** 2
-    )
+    total: float = 0.0
+    for c in range(3):
+        total += (points[k, c] - points[i, c]) ** 2
+    return total
 
 
 @njit(cache=True)
@@ -278,6 +283,43 @@ def _straighten(
             pushes[j + 1, c] += g * share * out[c]
             pushes[k, c] += (1.0 - f) * share * out[c]
             pushes[k + 1, c] += f * share * out[c]
+
+
+@njit(cache=True)
+def _turn_along(
+    points: FloatArray, fixed: int, length: float, rear: FloatArray, pushes: FloatArray, weights: FloatArray
+) -> None:
+    """Add pushes that turn the track towards the chord where a chord starts nearly across it.
+
+    A joint there would have to run far ahead of the tip, and at a right angle to jump.
+    """
+    n = points.shape[0]
+    for i in range(fixed, n):
+        k = int(rear[i])
+        if k < fixed:
+            continue
+        size, slope, chord = 0.0, 0.0, np.empty(3)
+        for c in range(3):
+            way = points[k + 1, c] - points[k, c]
+            here = points[k, c] + (rear[i] - k) * way
+            chord[c] = (points[i, c] - here) / length
+            slope += chord[c] * way
+            size += way * way
+        size = np.sqrt(size)
+        lack = LEAST_SLOPE * size - slope
+        if lack <= 0.0:
+            continue
+        for j in range(SPAN):
+            share = 0.5 * lack * (j + 0.5) * (1.0 - j / SPAN)
+            behind, ahead = k - j, k + 1 + j
+            if behind >= fixed:
+                weights[behind] += 1.0
+                for c in range(3):
+                    pushes[behind, c] -= share * chord[c]
+            if ahead < n - 1:
+                weights[ahead] += 1.0
+                for c in range(3):
+                    pushes[ahead, c] += share * chord[c]
 
 
 @njit(cache=True)
@@ -368,6 +410,7 @@ def relax(
             _look_up(points, boxes, REACH * length, near)
         pushes[:], weights[:] = 0.0, 0.0
         worst = push_chords(points, fixed, length, boxes, near, rear, front, pushes, weights)
+        _turn_along(points, fixed, length, rear, pushes, weights)
         if joint_limit < np.pi:
             _straighten(points, fixed, length, joint_limit, rear, front, pushes, weights)
         for i in range(fixed, n - 1):

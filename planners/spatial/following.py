@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 
 import numpy as np
 
-from planners.feeding import Feeding, feed
+from planners.feeding import STEP, feed
 from planners.kernels import feeding as feeding_kernel
-from planners.kernels.spatial_chords import chord_errors
-from planners.path import resampled
-from planners.problem import Failure, PlanningStatus
+from planners.kernels.spatial_chords import chord_errors, place_on_path
+from planners.path import arclength, resampled
+from planners.problem import PlanningStatus
 from planners.spatial.path import Path
 from planners.spatial.problem import SpatialCandidate, SpatialMotion
 from planners.spatial.query import SpatialQuery
@@ -36,8 +37,12 @@ class MappingError:
     path_to_link: float
 
 
-def follow_path(path: Path, workspace: Workspace, link_length: float) -> SpatialMotion | None:
-    """Feed an arm along the path; None if a joint would have to jump.
+def follow_path(path: Path, workspace: Workspace, link_length: float) -> SpatialMotion:
+    """Feed an arm along the path.
+
+    Long links cannot follow everywhere: where a link stands across the path at its rear end, that joint
+    jumps. Then the poses are those of even steps of the tip, with each joint at the nearest place behind the
+    next.
 
     Parameters
     ----------
@@ -50,29 +55,29 @@ def follow_path(path: Path, workspace: Workspace, link_length: float) -> Spatial
 
     Returns
     -------
-    motion : SpatialMotion or None
-        Its links may be in obstacles.
+    motion : SpatialMotion
+        Its links may be in obstacles, and its joints may jump.
     """
-    fed = _fed(path, workspace, link_length)
-    if fed.ending != feeding_kernel.DONE:
-        return None
-    return SpatialMotion.from_joints(fed.poses, link_length, workspace.base_pose_for(link_length))
-
-
-def _fed(path: Path, workspace: Workspace, link_length: float) -> Feeding:
-    base_pose = workspace.base_pose_for(link_length)
-    curve = path.points
+    base_pose, curve = workspace.base_pose_for(link_length), path.points
     if link_length > workspace.straight:
         curve = np.concatenate([base_pose[None, :3], curve])
-    return feed(curve, link_length, base_pose)
+    fed = feed(curve, link_length, base_pose)
+    poses = fed.poses
+    if fed.ending != feeding_kernel.DONE:
+        arc = arclength(curve)
+        tips = np.linspace(0.0, arc[-1], math.ceil(arc[-1] / (STEP * link_length)) + 1)
+        poses = np.empty((len(tips), math.ceil(arc[-1] / link_length) + 1, 3))
+        place_on_path(curve, arc, link_length, tips, base_pose, poses)
+        behind = (poses[-1] - base_pose[:3]) @ base_pose[3:] <= 0.0
+        poses = poses[:, int(np.argmin(behind)) - 1 :]  # one link is still in the feeder
+    return SpatialMotion.from_joints(poses, link_length, base_pose)
 
 
 def mapping_error(path: Path, link_length: float) -> MappingError:
     """Compute the mapping error of links of a length on a path, over all chords of that length."""
     points = resampled(path.points, min(path.length / len(path.points), link_length / 20.0))
-    return MappingError(
-        **dict(zip(("link_to_path", "path_to_link"), chord_errors(points, link_length), strict=True))
-    )
+    link_to_path, path_to_link = chord_errors(points, link_length)
+    return MappingError(link_to_path=link_to_path, path_to_link=path_to_link)
 
 
 def plan_following(query: SpatialQuery) -> SpatialCandidate:
@@ -83,16 +88,6 @@ def plan_following(query: SpatialQuery) -> SpatialCandidate:
             status=PlanningStatus.NO_PATH, reason="No way from the base to the goal was found for a point."
         )
     begin = time.perf_counter()
-    length, base_pose = query.arm.link_length, query.workspace.base_pose_for(query.arm.link_length)
-    fed = _fed(path, query.workspace, length)
-    motion = None
-    if fed.ending == feeding_kernel.DONE:
-        motion = SpatialMotion.from_joints(fed.poses, length, base_pose)
+    motion = follow_path(path, query.workspace, query.arm.link_length)
     query.timings["poses"] = time.perf_counter() - begin
-    if motion is None:
-        return SpatialCandidate(
-            status=PlanningStatus.DEAD_END,
-            reason=f"Links of {length:g} {query.workspace.units} cannot follow the path: a joint would jump.",
-            failure=Failure(place=fed.place, joints=fed.poses[-1]),
-        )
     return SpatialCandidate(status=PlanningStatus.SOLVED, motion=motion, track=path.points)

@@ -79,7 +79,7 @@ def plan(
     workspace : Workspace
         The workspace.
     arm : ArmSpec
-        The arm, its lengths in workspace units. With `n_links` None it gets as many links as the motion needs.
+        The arm, in workspace units. With `n_links` None it gets as many links as the motion needs.
     planner : str
         A key of `PLANNERS`.
     time_budget : float
@@ -166,7 +166,7 @@ def _answer(name: str, query: SpatialQuery, checker: _Checker) -> SpatialResult:
         return SpatialResult(
             status=PlanningStatus.SOLVED, planner=name, motion=motion, report=report, track=candidate.track
         )
-    fault = report.faults[0]
+    fault = min(report.faults, key=lambda one: one.kind not in ("penetration", "sweep"))
     return SpatialResult(
         status=PlanningStatus.NOT_VALID,
         planner=name,

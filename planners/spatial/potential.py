@@ -63,7 +63,7 @@ class Potential:
 
     @property
     def u(self) -> FloatArray:
-        """u itself, shape (nx, ny, nz); 0 also where it is below the smallest number."""
+        """U itself, shape (nx, ny, nz); 0 also where it is below the smallest number."""
         with np.errstate(under="ignore"):
             return np.exp(self.log_u)
 

@@ -67,16 +67,15 @@ class SpatialQuery:
 
     @property
     def start(self) -> tuple[FloatArray, float]:
-        """Return the curve from the end of the straight stretch to the goal from which chords grow, and their length.
+        """Return the curve on which chords begin to grow, from the straight stretch on, and their length.
 
         There must be a path or a warm start.
         """
-        curve, length = (
-            self.warm_start if self.warm_start is not None else (None, FIRST * self.arm.link_length)
-        )
-        if curve is None:
+        if self.warm_start is not None:
+            curve, length = self.warm_start
+        else:
             assert self.path is not None
-            curve = self.path.points
+            curve, length = self.path.points, FIRST * self.arm.link_length
         begin = self.workspace.base + self.workspace.straight * self.workspace.heading
         behind = int(np.argmin(np.linalg.norm(curve - begin, axis=1)))
         return np.concatenate([begin[None], curve[behind + 1 :]]), length

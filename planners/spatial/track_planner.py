@@ -31,15 +31,19 @@ from planners.spatial.workspace import Workspace
 
 __all__ = ["Track", "plan_track", "track_from_curve"]
 
-COARSE, FINE = 15, (30, 60)
-"""Samples per link while chords grow, and then."""
+GROWING = ((0.5, 60), (0.1, 30), (0.02, 30))
+FINISHING = ((0.3, 60), (0.03, 40), (0.003, 40))
+"""Smoothing and number of iterations, while chords grow and then: strong smoothing takes slack and cusps out
+of the track and leaves a residual, which weaker smoothing takes away."""
 
-STAGES = ((0.3, 100), (0.03, 50), (0.003, 50))
-"""Smoothing and number of iterations: strong smoothing takes slack and cusps out of the track and leaves a
-residual, which weaker smoothing takes away."""
+FINEST = 60
+"""Samples per link in the end: their number is doubled up to it."""
 
 DEEP = 0.01
 """Depth, in link lengths, that is left where no chord is free: the arm is not even fed then."""
+
+ASTRAY = 3.0
+"""A track that is this many times as long as it was winds about an obstacle which it cannot pass."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +54,8 @@ class Effort:
     ----------
     margin : float
         Kept from obstacles beyond the link radius, in link lengths.
+    coarse : int
+        Samples per link while chords grow. The fewer, the faster slack is smoothed out of the track.
     steps : int
         In how many steps chords grow.
     strict : float
@@ -57,14 +63,17 @@ class Effort:
     """
 
     margin: float
+    coarse: int
     steps: int
-    strict: float = 0.99
+    strict: float = 0.98
 
 
 EFFORTS = (
-    Effort(margin=0.003, steps=6),
-    Effort(margin=0.003, steps=20, strict=0.97),
-    Effort(margin=0.0015, steps=40),
+    Effort(margin=0.003, coarse=8, steps=20),
+    Effort(margin=0.003, coarse=15, steps=40),
+    Effort(margin=0.001, coarse=8, steps=20),
+    Effort(margin=0.001, coarse=15, steps=40, strict=0.95),
+    Effort(margin=0.001, coarse=10, steps=80, strict=0.95),
 )
 """What is tried, one after the other, until the exact checker agrees."""
 
@@ -91,7 +100,7 @@ class Track:
 
 
 def track_from_curve(workspace: Workspace, curve: FloatArray, length: float, per_link: int) -> Track:
-    """Sample a curve, shape (n, 3), from the end of the straight stretch to the goal, for links of a length."""
+    """Sample a curve, shape (n, 3), from the straight stretch to the goal, for links of a length."""
     start = workspace.base + workspace.straight * workspace.heading
     free = resampled(curve, length / per_link)
     axis = start + np.linspace(-length, 0.0, per_link + 1)[:, None] * workspace.heading
@@ -103,7 +112,7 @@ def plan_track(query: SpatialQuery) -> SpatialCandidate:
     if query.warm_start is None and query.path is None:
         return SpatialCandidate(
             status=PlanningStatus.NO_PATH,
-            reason="No way from the base to the goal was found, not even for the path of a ball of the links' radius.",
+            reason="No path from the base to the goal was found, not even for a ball of the links' radius.",
         )
     best = SpatialCandidate(
         status=PlanningStatus.OUT_OF_TIME, reason="Time was over before a track was shaped."
@@ -152,17 +161,26 @@ def _shaped(query: SpatialQuery, effort: Effort) -> tuple[Track, float] | None:
     boxes[:, 1] += arm.link_radius + effort.margin * arm.link_length
     limit = math.pi if arm.joint_limit is None else effort.strict * arm.joint_limit
     curve, first = query.start
-    lengths = np.geomspace(first, arm.link_length, effort.steps + 1)
-    plan = [(length, COARSE) for length in lengths] + [(arm.link_length, per_link) for per_link in FINE]
-    depth = 0.0
-    for number, (length, per_link) in enumerate(plan):
+    plan = [
+        (float(length), effort.coarse, GROWING)
+        for length in np.geomspace(first, arm.link_length, effort.steps + 1)
+    ]
+    per_link = effort.coarse
+    while per_link < FINEST:
+        per_link = min(2 * per_link, FINEST)
+        plan.append((arm.link_length, per_link, FINISHING))
+    depth, longest = 0.0, ASTRAY * float(arclength(curve)[-1])
+    for number, (length, per_link, stages) in enumerate(plan):
         query.tell("plan", number / len(plan))
         track = track_from_curve(workspace, curve, length, per_link)
-        for smoothing, iterations in STAGES:
+        for smoothing, iterations in stages:
             if query.late:
                 return None
             depth = kernel.relax(track.points, track.fixed, length, limit, boxes, smoothing, iterations)
         curve = track.free
+        if float(arclength(curve)[-1]) > longest:
+            depth = math.inf
+            break
     query.tell("plan", 1.0)
     return track, depth
 
