@@ -15,7 +15,7 @@ from planners.path import arclength, resampled
 from planners.problem import PlanningStatus
 from planners.spatial.path import Path
 from planners.spatial.problem import SpatialCandidate, SpatialMotion
-from planners.spatial.query import SpatialQuery
+from planners.spatial.query import SpatialQuery, behind_straight
 from planners.spatial.workspace import Workspace
 
 __all__ = ["MappingError", "follow_path", "mapping_error", "plan_following"]
@@ -58,9 +58,8 @@ def follow_path(path: Path, workspace: Workspace, link_length: float) -> Spatial
     motion : SpatialMotion
         Its links may be in obstacles, and its joints may jump.
     """
-    base_pose, curve = workspace.base_pose_for(link_length), path.points
-    if link_length > workspace.straight:
-        curve = np.concatenate([base_pose[None, :3], curve])
+    base_pose = workspace.base_pose_for(link_length)
+    curve = np.concatenate([base_pose[None, :3], behind_straight(workspace, path.points)])
     fed = feed(curve, link_length, base_pose)
     poses = fed.poses
     if fed.ending != feeding_kernel.DONE:

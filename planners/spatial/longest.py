@@ -1,4 +1,4 @@
-"""The designer's question in space: how long may a link be, and how few actuators does the arm need?"""
+"""The longest link in space: how long may links be, so how few actuators does the arm need."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from planners.problem import PlanningStatus, Progress
 from planners.spatial.planning import PLANNERS, plan
-from planners.spatial.problem import SpatialResult
+from planners.spatial.problem import SpatialMotion, SpatialResult
 from planners.spatial.workspace import Workspace
 
 __all__ = ["SpatialLongest", "SpatialTrial", "longest_link"]
@@ -39,7 +39,7 @@ class SpatialTrial:
     status : PlanningStatus
         SOLVED if there is a validated motion.
     n_links : int or None
-        What the motion takes, one actuated joint of two angles each.
+        What the motion takes; a joint of two angles each.
     clearance : float or None
         Smallest distance of the motion's links from an obstacle, less their radius.
     seconds : float
@@ -73,6 +73,11 @@ class SpatialLongest:
     result: SpatialResult | None
     trials: tuple[SpatialTrial, ...]
     complete: bool
+
+    @property
+    def motion(self) -> SpatialMotion | None:
+        """The validated motion of the longest link; None if none was found."""
+        return None if self.result is None else self.result.motion
 
     def to_dict(self) -> dict[str, Any]:
         """Return the outcome as plain numbers and strings."""

@@ -16,10 +16,17 @@ from planners.spatial.potential import laplace_potential
 from planners.spatial.problem import SpatialMotion
 from planners.spatial.workspace import Workspace
 
-__all__ = ["SpatialQuery"]
+__all__ = ["SpatialQuery", "behind_straight"]
 
 FIRST = 0.5
 """Share of the link length with which chords on the path begin to grow."""
+
+
+def behind_straight(workspace: Workspace, curve: FloatArray) -> FloatArray:
+    """Return the part of a curve behind the straight stretch, shape (n, 3), the end of that first."""
+    end = workspace.base + workspace.straight * workspace.heading
+    nearest = int(np.argmin(np.linalg.norm(curve - end, axis=1)))
+    return np.concatenate([end[None], curve[nearest + 1 :]])
 
 
 @dataclass(eq=False, kw_only=True)
@@ -76,9 +83,7 @@ class SpatialQuery:
         else:
             assert self.path is not None
             curve, length = self.path.points, FIRST * self.arm.link_length
-        begin = self.workspace.base + self.workspace.straight * self.workspace.heading
-        behind = int(np.argmin(np.linalg.norm(curve - begin, axis=1)))
-        return np.concatenate([begin[None], curve[behind + 1 :]]), length
+        return behind_straight(self.workspace, curve), length
 
     def tell(self, stage: str, share: float) -> None:
         """Report progress."""
