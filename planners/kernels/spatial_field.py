@@ -16,13 +16,13 @@ SIXTH = 1.0 / 6.0
 EVERY = 5
 """Sweeps from one look at the change to the next."""
 
-PATIENCE = 100
-"""Steps of the ascent within which u must rise."""
+TRIES, SHORTER = 40, 0.8
+"""How often the ascent tries a step, each time so much shorter, until u rises; then it gives up."""
 
 
 @numba.njit(cache=True)
 def flood(free: BoolArray, stride_x: int, stride_y: int, goal: int) -> tuple[IntArray, IntArray]:
-    """Number the free nodes by the steps it takes from the goal.
+    """Order the free nodes by how many steps from the goal they are.
 
     Parameters
     ----------
@@ -64,8 +64,8 @@ def flood(free: BoolArray, stride_x: int, stride_y: int, goal: int) -> tuple[Int
 def add_slowest_modes(free: BoolArray, modes: FloatArray) -> None:
     """Add cos(pi / (n + 1)) / 3 to each of n free nodes in a row along the last axis.
 
-    Summed over the three axes, this is the factor by which the Jacobi iteration damps the slowest mode of a box
-    as wide as the free space at a node.
+    Summed over the three axes, this is the factor by which the Jacobi iteration damps the slowest mode of a
+    box as wide as the free space at a node.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def rise(log_u: FloatArray, x: float, y: float, z: float) -> tuple[float, float,
     log_u, dx, dy, dz : float
         All zero, and the logarithm minus infinity, where u is 0 at all eight corners or off the grid.
     """
-    i, j, k = int(math.floor(x)), int(math.floor(y)), int(math.floor(z))
+    i, j, k = math.floor(x), math.floor(y), math.floor(z)
     nx, ny, nz = log_u.shape
     if not (0 <= i < nx - 1 and 0 <= j < ny - 1 and 0 <= k < nz - 1):
         return -np.inf, 0.0, 0.0, 0.0
@@ -194,17 +194,19 @@ def ascend_in_space(
     start, goal : array, shape (3,)
         In cells from node (0, 0, 0).
     step, stop : float
-        Length of a step, and distance from the goal at which to end, in cells.
+        Largest length of a step, and distance from the goal at which to end, in cells.
 
     Returns
     -------
     points : array, shape (n, 3)
-        In cells, from the start to within `stop` of the goal. Empty if the ascent ended before.
+        In cells, from the start to within `stop` of the goal; u rises from each to the next. Empty if the
+        ascent ended before.
     """
     points = np.empty((1024, 3))
     x, y, z = start[0], start[1], start[2]
-    n, best, risen = 0, -np.inf, 0
-    while True:
+    value, dx, dy, dz = rise(log_u, x, y, z)
+    n = 0
+    while value > -np.inf:
         if n == len(points):
             more = np.empty((2 * n, 3))
             more[:n] = points
@@ -213,11 +215,18 @@ def ascend_in_space(
         n += 1
         if (x - goal[0]) ** 2 + (y - goal[1]) ** 2 + (z - goal[2]) ** 2 <= stop * stop:
             return points[:n].copy()
-        value, dx, dy, dz = rise(log_u, x, y, z)
-        if value > best:
-            best, risen = value, n
-        half = 0.5 * step
-        middle, dx, dy, dz = rise(log_u, x + half * dx, y + half * dy, z + half * dz)
-        if value == -np.inf or middle == -np.inf or n - risen > PATIENCE:
-            return points[:0].copy()
-        x, y, z = x + step * dx, y + step * dy, z + step * dz
+        half, far = 0.5 * step, step
+        _, sx, sy, sz = rise(log_u, x + half * dx, y + half * dy, z + half * dz)
+        now, value = value, -np.inf
+        for _ in range(TRIES):
+            length = max(math.sqrt(sx * sx + sy * sy + sz * sz), 1e-12)
+            px, py, pz = x + far * sx / length, y + far * sy / length, z + far * sz / length
+            there, dx, dy, dz = rise(log_u, px, py, pz)
+            if there > now:
+                x, y, z, value = px, py, pz, there
+                break
+            # The step has crossed a ridge of u: the way along it is between the slopes on its sides. Adding
+            # those met so far finds a direction that rises on all of them, as a perceptron does.
+            far *= SHORTER
+            sx, sy, sz = sx + dx, sy + dy, sz + dz
+    return points[:0].copy()

@@ -33,9 +33,9 @@ TOLERANCE = 1e-6
 MAX_SWEEPS = 5_000
 
 LEVELS, OVERLAP = 390, 130
-"""Steps from the goal solved at once, and how many of them once more with the next. u falls by less than 6 per
-step, so by less than 1e304 in one piece; cutting u off behind the overlap changes it by 2e-6 at its beginning
-in a passage of 80 cells, less in narrower ones."""
+"""Steps from the goal solved at once, and how many of them once more with the next. From step to step u falls
+at most to a sixth, so in one piece by less than 1e304; cutting u off behind the overlap changes it by 2e-6 at
+the overlap's beginning in a passage of 80 cells, less in narrower ones."""
 
 SNAP = 1e-9
 """In cells: how near to a node a wall is on it."""
@@ -63,7 +63,7 @@ class Potential:
 
     @property
     def u(self) -> FloatArray:
-        """u itself, shape (nx, ny, nz); 0 also where it is below the smallest number."""
+        """The potential itself, shape (nx, ny, nz); 0 also where it is below the smallest number."""
         with np.errstate(under="ignore"):
             return np.exp(self.log_u)
 
