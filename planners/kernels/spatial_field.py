@@ -8,8 +8,11 @@ import math
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from planners.kernels.types import BoolArray, FloatArray, IntArray
+
+IndexArray = NDArray[np.uint32]
 
 SIXTH = 1.0 / 6.0
 
@@ -92,27 +95,58 @@ def add_slowest_modes(free: BoolArray, modes: FloatArray) -> None:
 
 
 @numba.njit(cache=True)
-def relax(
-    u: FloatArray,
-    order: IntArray,
-    weights: FloatArray,
-    stride_x: int,
-    stride_y: int,
-    tolerance: float,
-    max_sweeps: int,
-) -> int:
-    """Bring u to the mean of its six neighbours, by over-relaxed Gauss-Seidel sweeps in a given order.
+def neighbours_of(order: IntArray, n_nodes: int, stride_x: int, stride_y: int) -> IndexArray:
+    """Look up the six neighbours of each node by their places in `order`.
 
     Parameters
     ----------
-    u : array, shape (n_nodes,)
-        Changed in place at the nodes in `order`.
     order : array, shape (n,)
-        The nodes, those nearest to the source first: then each sweep carries u all the way.
-    weights : array, shape (n,)
-        Over-relaxation, from 1 to below 2.
+        Nodes of the grid.
+    n_nodes : int
+        Of the grid.
     stride_x, stride_y : int
         Of the flat array.
+
+    Returns
+    -------
+    neighbours : array, shape (n, 6)
+        n for a node that is not in `order`.
+    """
+    place = np.full(n_nodes, order.size, dtype=np.uint32)
+    for k in range(order.size):
+        place[order[k]] = k
+    # Without a sign: a sweep need not ask whether an index counts from the end, which halves its time.
+    neighbours = np.empty((order.size, 6), dtype=np.uint32)
+    for k in range(order.size):
+        i = order[k]
+        neighbours[k, 0], neighbours[k, 1] = place[i - stride_x], place[i + stride_x]
+        neighbours[k, 2], neighbours[k, 3] = place[i - stride_y], place[i + stride_y]
+        neighbours[k, 4], neighbours[k, 5] = place[i - 1], place[i + 1]
+    return neighbours
+
+
+@numba.njit(cache=True)
+def relax(
+    u: FloatArray,
+    neighbours: IndexArray,
+    weights: FloatArray,
+    first: int,
+    tolerance: float,
+    max_sweeps: int,
+) -> int:
+    """Bring u to the mean of its six neighbours, by over-relaxed Gauss-Seidel sweeps.
+
+    Parameters
+    ----------
+    u : array, shape (n_reached + 1,)
+        At the nodes in the order of `flood`, in which each sweep carries u from the goal all the way; the
+        last value is that at walls. Changed in place.
+    neighbours : array, shape (n, 6)
+        Of each node to sweep, as `neighbours_of` returns them.
+    weights : array, shape (n,)
+        Over-relaxation of each, from 1 to below 2.
+    first : int
+        The first node to sweep. Those before and behind the n nodes keep their u.
     tolerance : float
         Change of u, relative to u itself at each node, below which to stop.
     max_sweeps : int
@@ -126,13 +160,18 @@ def relax(
     for sweep in range(1, max_sweeps + 1):
         settled = True
         looks = sweep % EVERY == 0
-        for k in range(order.size):
-            i = order[k]
+        for k in range(len(neighbours)):
+            # Written out: an array for the row of neighbours would cost half as much again.
             mean = SIXTH * (
-                u[i - stride_x] + u[i - stride_y] + u[i - 1] + u[i + 1] + u[i + stride_y] + u[i + stride_x]
+                u[neighbours[k, 0]]
+                + u[neighbours[k, 1]]
+                + u[neighbours[k, 2]]
+                + u[neighbours[k, 3]]
+                + u[neighbours[k, 4]]
+                + u[neighbours[k, 5]]
             )
-            change = mean - u[i]
-            u[i] += weights[k] * change
+            change = mean - u[first + k]
+            u[first + k] += weights[k] * change
             if looks and not abs(change) < tolerance * mean:
                 settled = False
         if looks and settled:
