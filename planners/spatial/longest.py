@@ -107,7 +107,7 @@ def longest_link(
     link_radius: float = 0.0,
     joint_limit: float | None = None,
     accuracy: float = 1e-3,
-    time_budget: float = 10.0,
+    time_budget: float = 30.0,
     progress: Progress | None = None,
 ) -> SpatialLongest:
     """Find the longest link with which a planner reaches the goal.

@@ -21,8 +21,8 @@ STOP = 0.5
 """Distance from the goal's node at which the descent jumps to it, in cells."""
 
 WINDOW, PASSES = 15, 3
-"""Points on each side in the moving average, and how often it is taken. With wider windows the path comes near
-corners: in the paired panels links of 57.5 can follow it with 15, of 44 with 30 and of 20 with 40."""
+"""Points on each side in the moving average, and how often it is taken. With wider windows the path comes
+near corners: in the paired panels links of 57.5 can follow it with 15, of 44 with 30 and of 20 with 40."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from hrsnake_env.arguments import check_at_least
 from hrsnake_env.errors import InputError
-from planners.kernels.spatial_field import add_slowest_modes, flood, relax
+from planners.kernels.spatial_field import IndexArray, add_slowest_modes, flood, neighbours_of, relax
 from planners.kernels.types import BoolArray, FloatArray, IntArray
 from planners.spatial.workspace import AXES, Workspace
 
@@ -33,9 +33,9 @@ TOLERANCE = 1e-6
 MAX_SWEEPS = 5_000
 
 LEVELS, OVERLAP = 390, 130
-"""Steps from the goal solved at once, and how many of them once more with the next. u falls by less than 6 per
-step, so by less than 1e304 in one piece; cutting u off behind the overlap changes it by 2e-6 at its beginning
-in a passage of 80 cells, less in narrower ones."""
+"""Steps from the goal solved at once, and how many of them once more with the next. From step to step u falls
+at most to a sixth, so in one piece by less than 1e304; cutting u off behind the overlap changes it by 2e-6 at
+the overlap's beginning in a passage of 80 cells, less in narrower ones."""
 
 SNAP = 1e-9
 """In cells: how near to a node a wall is on it."""
@@ -63,7 +63,7 @@ class Potential:
 
     @property
     def u(self) -> FloatArray:
-        """U itself, shape (nx, ny, nz); 0 also where it is below the smallest number."""
+        """The potential itself, shape (nx, ny, nz); 0 also where it is below the smallest number."""
         with np.errstate(under="ignore"):
             return np.exp(self.log_u)
 
@@ -118,7 +118,9 @@ def laplace_potential(
         order, levels = flood(free.ravel(), stride_x, stride_y, int(goals[np.argmin(away)] @ strides))
         start = workspace.base + workspace.straight * workspace.heading
         if np.isin(_corners(workspace, start, size) @ strides, order).any():
-            log_u = _solve(order, levels, _weights(free, order), stride_x, stride_y, free.size)
+            neighbours = neighbours_of(order, free.size, stride_x, stride_y)
+            log_u = np.full(free.size, -np.inf)
+            log_u[order] = _solve(levels, neighbours, _weights(free, order))
             return Potential(log_u=log_u.reshape(free.shape), origin=workspace.room_low, cell=size)
     return None
 
@@ -182,30 +184,30 @@ def _weights(free: BoolArray, order: IntArray) -> FloatArray:
     return np.asarray(2.0 / (1.0 + np.sqrt(1.0 - slowest**2)))
 
 
-def _solve(
-    order: IntArray, levels: IntArray, weights: FloatArray, stride_x: int, stride_y: int, n_nodes: int
-) -> FloatArray:
-    """Return log u, shape (n_nodes,), solving `LEVELS` at a time with u scaled to 1 at the first of them."""
-    u, log_u, log_scale = np.zeros(n_nodes), np.full(n_nodes, -np.inf), 0.0
-    u[order[0]], log_u[order[0]] = 1.0, 0.0
+def _solve(levels: IntArray, neighbours: IndexArray, weights: FloatArray) -> FloatArray:
+    """Return log u in the order of the flood, solving `LEVELS` at a time with u scaled to 1 at their rim."""
+    u, log_u, log_scale = np.zeros(len(weights) + 1), np.zeros(len(weights)), 0.0
+    u[0] = 1.0
     done, n_levels = 1, len(levels) - 1
     while done < n_levels:
         end = min(done + LEVELS, n_levels)
         part = slice(levels[done], levels[end])
-        for share in (1.0, 0.5, 0.0):
-            # Over-relaxation with weights that differ is not proved to settle. It has never failed to.
-            over = 1.0 + share * (weights[part] - 1.0)
-            n_sweeps = relax(u, order[part], over, stride_x, stride_y, TOLERANCE, MAX_SWEEPS)
-            if n_sweeps:
-                break
-            u[order[part]] = 0.0
-        else:
-            raise RuntimeError(f"The potential has not settled within {MAX_SWEEPS} sweeps.")
+        _relax(u, neighbours[part], weights[part], int(levels[done]))
         kept = end if end == n_levels else end - OVERLAP
-        nodes = order[levels[done] : levels[kept]]
-        log_u[nodes] = np.log(u[nodes]) + log_scale
+        part = slice(levels[done], levels[kept])
+        log_u[part] = np.log(u[part]) + log_scale
         done = kept
-        scale = u[order[levels[done - 1] : levels[done]]].max()
-        u[order[levels[done - 1] :]] /= scale
+        scale = u[levels[done - 1] : levels[done]].max()
+        u[levels[done - 1] :] /= scale
         log_scale += math.log(scale)
     return log_u
+
+
+def _relax(u: FloatArray, neighbours: IndexArray, weights: FloatArray, first: int) -> None:
+    for share in (1.0, 0.5, 0.0):
+        # Over-relaxation with weights that differ is not proved to settle; without any it is.
+        over = 1.0 + share * (weights - 1.0)
+        if relax(u, neighbours, over, first, TOLERANCE, MAX_SWEEPS):
+            return
+        u[first : first + len(weights)] = 0.0
+    raise RuntimeError(f"The potential has not settled within {MAX_SWEEPS} sweeps.")
