@@ -9,6 +9,8 @@ of the planar arm, counter-clockwise positive.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -42,12 +44,12 @@ def base_frame(base_pose: ArrayLike) -> FloatArray:
         If there is no heading in it.
     """
     pose = np.asarray(base_pose, dtype=np.float64)
-    if pose.shape != (6,) or not 0.0 < np.linalg.norm(pose[3:]) < np.inf:
+    if pose.shape != (6,) or not 0.0 < math.hypot(*pose[3:]) < math.inf:
         raise InputError(
             "Expected a base_pose with shape (6,), the position and a heading of length 1, got "
             f"{pose.tolist() if pose.size <= 6 else pose.shape}."
         )
-    x = pose[3:] / np.linalg.norm(pose[3:])
+    x = pose[3:] / math.hypot(*pose[3:])
     # y is square to the heading and to what z shall point along: no difference that could cancel.
     horizontal = np.hypot(x[0], x[1])
     y = np.array([-x[1], x[0], 0.0]) if horizontal >= VERTICAL else np.array([0.0, -x[2], x[1]])
@@ -165,7 +167,7 @@ def configuration_from_joints(
         ahead, left, up = np.einsum("nij,nj->in", frames, steps[:, k])
         aside = np.hypot(left, up)
         theta = np.arctan2(aside, ahead)
-        # A full reversal has no side of its own: it is towards y. (Subnormal numbers have no quotient either.)
+        # A full reversal has no side of its own: it is towards y. Subnormal numbers have no quotient.
         some = aside >= np.finfo(np.float64).tiny
         angles[:, k, 0] = theta * np.divide(left, aside, out=np.ones_like(aside), where=some)
         angles[:, k, 1] = theta * np.divide(up, aside, out=np.zeros_like(aside), where=some)

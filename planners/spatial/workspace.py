@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 from dataclasses import dataclass, field
@@ -145,7 +146,7 @@ class Workspace:
         object.__setattr__(self, "panels", tuple(self.panels))
         _store(self, "boxes", _boxes(self.boxes))
         for key in ("base", "heading", "goal"):
-            _store(self, key, _vector(getattr(self, key), key))
+            _store(self, key, _vector(getattr(self, key), f"the {key}"))
         if not self.heading.any():
             raise InputError("Expected a heading of some length, got (0, 0, 0).")
         _store(self, "heading", _unit(self.heading))
@@ -217,8 +218,8 @@ class Workspace:
         end = self.base + self.straight * self.heading
         if not ((end > self.room_low).all() and (end < self.room_high).all()):
             raise InputError(
-                f"Expected a straight stretch of {self.straight:g} from the base {_text(self.base)} that ends "
-                f"inside {room}, got its end at {_text(end)}."
+                f"Expected a straight stretch of {self.straight:g} from the base {_text(self.base)} that "
+                f"ends inside {room}, got its end at {_text(end)}."
             )
 
     def base_pose_for(self, link_length: float) -> FloatArray:
@@ -401,16 +402,16 @@ def _vector(value: Any, what: str) -> FloatArray:
 
 def _unit(vector: FloatArray) -> FloatArray:
     """Return a vector of length 1 along another; itself if it is one but for rounding."""
-    if abs(float(np.linalg.norm(vector)) - 1.0) <= 4.0 * np.finfo(np.float64).eps:
+    if abs(math.hypot(*vector) - 1.0) <= 4.0 * np.finfo(np.float64).eps:
         return vector
     # First by the largest number, as squares may be too large or too small.
     vector = vector / np.abs(vector).max()
-    return np.asarray(vector / np.linalg.norm(vector), dtype=np.float64)
+    return np.asarray(vector / math.hypot(*vector), dtype=np.float64)
 
 
 def _positive(value: Any, what: str) -> float:
     if not is_number(value) or not 0.0 < value <= sys.float_info.max:
-        raise InputError(f"Expected a positive, finite {what}, got {value!r}.")
+        raise InputError(f"Expected {what} to be positive and finite, got {value!r}.")
     return float(value)
 
 
@@ -427,8 +428,8 @@ def _boxes(value: Any) -> FloatArray:
     if boxes.ndim != 3 or boxes.shape[1:] != (2, 3):
         raise InputError(f"Expected boxes with shape (n_boxes, 2, 3), got {boxes.shape}.")
     for number, (low, high) in enumerate(value):
-        corners = (_vector(corner, f"a corner of box {number}") for corner in (low, high))
-        _check_box(*corners, f"box {number}")
+        what = f"a corner of box {number}"
+        _check_box(_vector(low, what), _vector(high, what), f"box {number}")
     return boxes
 
 
