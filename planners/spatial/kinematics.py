@@ -9,10 +9,13 @@ of the planar arm, counter-clockwise positive.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hrsnake_env.arm import FloatArray
+from hrsnake_env.errors import InputError
 
 __all__ = [
     "base_frame",
@@ -20,6 +23,9 @@ __all__ = [
     "joints_from_configuration",
     "universal_angles_from_joint_angles",
 ]
+
+VERTICAL = 1e-9
+"""A heading is vertical if its horizontal part is shorter than this: less than rounding leaves of a turn."""
 
 
 def base_frame(base_pose: ArrayLike) -> FloatArray:
@@ -31,13 +37,31 @@ def base_frame(base_pose: ArrayLike) -> FloatArray:
     ----------
     base_pose : array-like, shape (6,)
         Position of the base, in workspace units, and unit heading.
+
+    Raises
+    ------
+    InputError
+        If there is no heading in it.
     """
-    x = np.asarray(base_pose, dtype=np.float64)[3:]
-    x = x / np.linalg.norm(x)
-    up = np.array([0.0, 0.0, 1.0]) if abs(x[2]) < 1.0 - 1e-9 else np.array([1.0, 0.0, 0.0])
-    z = up - (up @ x) * x
-    z /= np.linalg.norm(z)
-    return np.stack([x, np.cross(z, x), z])
+    pose = np.asarray(base_pose, dtype=np.float64)
+    if pose.shape != (6,) or not 0.0 < math.hypot(*pose[3:]) < math.inf:
+        raise InputError(
+            "Expected a base_pose with shape (6,), the position and a heading of length 1, got "
+            f"{pose.tolist() if pose.size <= 6 else pose.shape}."
+        )
+    x = pose[3:] / math.hypot(*pose[3:])
+    # y is square to the heading and to what z shall point along: no difference that could cancel.
+    horizontal = np.hypot(x[0], x[1])
+    y = np.array([-x[1], x[0], 0.0]) if horizontal >= VERTICAL else np.array([0.0, -x[2], x[1]])
+    y /= np.linalg.norm(y)
+    return np.stack([x, y, np.cross(x, y)])
+
+
+def _checked(values: ArrayLike, what: str, middle: str, last: int) -> FloatArray:
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim != 3 or array.shape[2] != last:
+        raise InputError(f"Expected {what} with shape (n_poses, {middle}, {last}), got {array.shape}.")
+    return array
 
 
 def _bent(frames: FloatArray, angles: FloatArray) -> FloatArray:
@@ -77,6 +101,11 @@ def joints_from_configuration(
     joints : array, shape (n_poses, n_links + 1, 3)
         Base end first, tip last, in workspace units.
 
+    Raises
+    ------
+    InputError
+        If shapes do not agree.
+
     Examples
     --------
     >>> base = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
@@ -85,8 +114,10 @@ def joints_from_configuration(
             [ 0.,  0.,  0.],
             [ 0.,  2.,  0.]]])
     """
-    feed, angles = np.asarray(feed, dtype=np.float64), np.asarray(joint_angles, dtype=np.float64)
+    feed, angles = np.asarray(feed, dtype=np.float64), _checked(joint_angles, "joint_angles", "n_links", 2)
     n_poses, n_links = angles.shape[:2]
+    if feed.shape != (n_poses,):
+        raise InputError(f"Expected feed with shape ({n_poses},), got {feed.shape}.")
     position, axes = np.asarray(base_pose, dtype=np.float64)[:3], base_frame(base_pose)
     joints = np.empty((n_poses, n_links + 1, 3))
     joints[:, 0] = position + (feed - n_links * link_length)[:, None] * axes[0]
@@ -101,6 +132,8 @@ def configuration_from_joints(
     joints: ArrayLike, link_length: float, base_pose: ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
     """Compute feed and joint angles from joint positions (the inverse of `joints_from_configuration`).
+
+    Only the directions of the links count; a link without length goes straight on.
 
     Parameters
     ----------
@@ -117,23 +150,27 @@ def configuration_from_joints(
         In workspace units.
     joint_angles : array, shape (n_poses, n_links, 2)
         In rad; hypot of the two is at most pi.
+
+    Raises
+    ------
+    InputError
+        If a shape is wrong.
     """
-    places = np.asarray(joints, dtype=np.float64)
+    places = _checked(joints, "joints", "n_links + 1", 3)
     n_links = places.shape[1] - 1
     position, axes = np.asarray(base_pose, dtype=np.float64)[:3], base_frame(base_pose)
     feed = (places[:, 0] - position) @ axes[0] + n_links * link_length
-    directions = np.diff(places, axis=1)
-    directions /= np.linalg.norm(directions, axis=2, keepdims=True)
+    steps = np.diff(places, axis=1)
     angles = np.empty((len(places), n_links, 2))
     frames = np.broadcast_to(axes, (len(places), 3, 3))
     for k in range(n_links):
-        ahead, left, up = np.einsum("nij,nj->in", frames, directions[:, k])
+        ahead, left, up = np.einsum("nij,nj->in", frames, steps[:, k])
         aside = np.hypot(left, up)
         theta = np.arctan2(aside, ahead)
-        # A full reversal has no side of its own: it is towards y.
-        scale = np.divide(theta, aside, out=np.ones_like(theta), where=aside > 0.0)
-        angles[:, k, 0] = np.where(aside > 0.0, scale * left, theta)
-        angles[:, k, 1] = np.where(aside > 0.0, scale * up, 0.0)
+        # A full reversal has no side of its own: it is towards y. Subnormal numbers have no quotient.
+        some = aside >= np.finfo(np.float64).tiny
+        angles[:, k, 0] = theta * np.divide(left, aside, out=np.ones_like(aside), where=some)
+        angles[:, k, 1] = theta * np.divide(up, aside, out=np.zeros_like(aside), where=some)
         frames = _bent(frames, angles[:, k])
     return feed, angles
 
@@ -155,8 +192,13 @@ def universal_angles_from_joint_angles(joint_angles: ArrayLike) -> FloatArray:
     -------
     angles : array, shape (n_poses, n_links, 2)
         Yaw and pitch in rad.
+
+    Raises
+    ------
+    InputError
+        If the shape is wrong.
     """
-    bends = np.asarray(joint_angles, dtype=np.float64)
+    bends = _checked(joint_angles, "joint_angles", "n_links", 2)
     angles = np.empty_like(bends)
     frames = universal = np.broadcast_to(np.eye(3), (len(bends), 3, 3))
     for k in range(bends.shape[1]):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hrsnake_env.arguments import is_number
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
@@ -54,10 +55,12 @@ class SpatialMotion:
 
     def __post_init__(self) -> None:
         for key in ("joints", "joint_angles", "feed", "base_pose"):
-            array = np.array(getattr(self, key), dtype=np.float64)
+            try:
+                array = np.array(getattr(self, key), dtype=np.float64)
+            except (TypeError, ValueError):
+                raise InputError(f"Expected {key} of a motion as an array of numbers.") from None
             array.setflags(write=False)
             object.__setattr__(self, key, array)
-        object.__setattr__(self, "link_length", float(self.link_length))
         shape = self.joint_angles.shape
         if len(shape) != 3 or shape[2] != 2 or 0 in shape:
             raise InputError(f"Expected joint_angles with shape (n_poses, n_links, 2), got {shape}.")
@@ -65,12 +68,16 @@ class SpatialMotion:
         for key, expected in wanted.items():
             if getattr(self, key).shape != expected:
                 raise InputError(f"Expected {key} with shape {expected}, got {getattr(self, key).shape}.")
-        if not (np.isfinite(self.link_length) and self.link_length > 0.0):
+        if not is_number(self.link_length) or not 0.0 < self.link_length < np.inf:
             raise InputError(f"Expected a positive, finite link_length, got {self.link_length!r}.")
-        if not all(np.isfinite(getattr(self, key)).all() for key in (*wanted, "joint_angles")):
-            raise InputError("Expected a motion of finite numbers, got NaN or infinity.")
+        object.__setattr__(self, "link_length", float(self.link_length))
+        for key in (*wanted, "joint_angles"):
+            if not np.isfinite(getattr(self, key)).all():
+                raise InputError(f"Expected a motion of finite numbers, got NaN or infinity in {key}.")
         if not np.isclose(np.linalg.norm(self.base_pose[3:]), 1.0, rtol=0.0, atol=1e-9):
-            raise InputError(f"Expected a base_pose with a heading of length 1, got {self.base_pose[3:]}.")
+            raise InputError(
+                f"Expected a base_pose with a heading of length 1, got {self.base_pose[3:].tolist()}."
+            )
 
     def __repr__(self) -> str:
         return f"SpatialMotion({self.n_poses} poses, {self.n_links} links of {self.link_length:g})"

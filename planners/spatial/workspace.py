@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+import math
 import os
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hrsnake_env.arguments import check_at_least, numbers
+from hrsnake_env.arguments import is_number, numbers
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
@@ -53,13 +55,13 @@ class Panel:
     def __post_init__(self) -> None:
         if self.normal not in tuple(AXES):
             raise InputError(f"Expected the normal of a panel to be x, y or z, got {self.normal!r}.")
-        _store_box(self, "low", "high", "panel")
+        _store_box(self, "low", "high", "a panel")
         axis = AXES.index(self.normal)
         for key, limit in (("window_low", self.low), ("window_high", self.high)):
-            corner = _vector(getattr(self, key), f"{key} of a panel").copy()
+            corner = _vector(getattr(self, key), "a corner of the window of a panel")
             corner[axis] = limit[axis]
             object.__setattr__(self, key, corner)
-        _store_box(self, "window_low", "window_high", "window")
+        _store_box(self, "window_low", "window_high", "the window of a panel")
         if not ((self.window_low >= self.low).all() and (self.window_high <= self.high).all()):
             raise InputError(
                 f"Expected the window of a panel inside it, from {_text(self.low)} to {_text(self.high)}, "
@@ -118,7 +120,8 @@ class Workspace:
     Raises
     ------
     InputError
-        If a box is inside out, or base or goal are outside the room or in an obstacle.
+        If a box is inside out, if base, goal or the end of the straight stretch are outside the room, or if
+        base or goal are in an obstacle (the base may lie on one, the feeder may come through it).
     """
 
     name: str
@@ -135,35 +138,22 @@ class Workspace:
     units: str = "units"
 
     def __post_init__(self) -> None:
-        _store_box(self, "room_low", "room_high", "room")
+        _store_box(self, "room_low", "room_high", "a room")
         for side in self.open_sides:
             if side not in SIDES:
                 raise InputError(f"Unknown side of a room {side!r}. Available: {', '.join(SIDES)}.")
         object.__setattr__(self, "open_sides", tuple(self.open_sides))
         object.__setattr__(self, "panels", tuple(self.panels))
-        boxes = np.empty((0, 2, 3)) if self.boxes is None else numbers("boxes", self.boxes)
-        if boxes.size == 0:
-            boxes = boxes.reshape(0, 2, 3)
-        if boxes.ndim != 3 or boxes.shape[1:] != (2, 3):
-            raise InputError(f"Expected boxes with shape (n_boxes, 2, 3), got {boxes.shape}.")
-        for number, box in enumerate(boxes):
-            _check_box(box[0], box[1], f"box {number}")
-        boxes.setflags(write=False)
-        object.__setattr__(self, "boxes", boxes)
+        _store(self, "boxes", _boxes(self.boxes))
         for key in ("base", "heading", "goal"):
-            _store(self, key, _vector(getattr(self, key), key))
-        size = float(np.linalg.norm(self.heading))
-        if size == 0.0:
+            _store(self, key, _vector(getattr(self, key), f"the {key}"))
+        if not self.heading.any():
             raise InputError("Expected a heading of some length, got (0, 0, 0).")
-        _store(self, "heading", self.heading / size)
+        _store(self, "heading", _unit(self.heading))
         for key in ("straight", "goal_radius"):
-            check_at_least(key, getattr(self, key), 0.0)
-            if getattr(self, key) == 0.0:
-                raise InputError(f"Expected a positive {key}, got 0.")
-            object.__setattr__(self, key, float(getattr(self, key)))
+            object.__setattr__(self, key, _positive(getattr(self, key), key))
         _store(self, "obstacles", self._obstacles())
-        self._check_place("base", self.base)
-        self._check_place("goal", self.goal)
+        self._check_places()
         if float(np.linalg.norm(self.goal - self.base)) <= self.goal_radius:
             raise InputError(
                 f"Expected a goal away from the base, got one whose radius of {self.goal_radius:g} reaches "
@@ -171,7 +161,8 @@ class Workspace:
             )
 
     def __repr__(self) -> str:
-        return f"Workspace({self.name!r}, {len(self.panels)} panels, {len(self.walls)} boxes)"
+        assert self.boxes is not None
+        return f"Workspace({self.name!r}, {len(self.panels)} panels, {len(self.boxes)} boxes)"
 
     obstacles: FloatArray = field(init=False)
     """Boxes, shape (n, 2, 3), whose union leaves the free space: the walls and the closed sides of the room.
@@ -197,25 +188,38 @@ class Workspace:
         sides = []
         for axis in range(3):
             if AXES[axis] + "-" not in self.open_sides:
-                walls[walls[:, 0, axis] <= low[axis], 0, axis] = low[axis] - thick
+                touch = walls[:, 0, axis] <= low[axis]
+                walls[touch, 0, axis] = np.minimum(walls[touch, 0, axis], low[axis] - thick)
                 sides.append(_slab(low - thick, high + thick, axis, None, low[axis]))
             if AXES[axis] + "+" not in self.open_sides:
-                walls[walls[:, 1, axis] >= high[axis], 1, axis] = high[axis] + thick
+                touch = walls[:, 1, axis] >= high[axis]
+                walls[touch, 1, axis] = np.maximum(walls[touch, 1, axis], high[axis] + thick)
                 sides.append(_slab(low - thick, high + thick, axis, high[axis], None))
         return np.concatenate([walls, np.array(sides).reshape(-1, 2, 3)])
 
-    def _check_place(self, what: str, place: FloatArray) -> None:
-        if not ((place >= self.room_low).all() and (place <= self.room_high).all()):
+    def _check_places(self) -> None:
+        room = f"the room, from {_text(self.room_low)} to {_text(self.room_high)}"
+        if not ((self.base >= self.room_low).all() and (self.base <= self.room_high).all()):
+            raise InputError(f"Expected a base in {room}, got {_text(self.base)}.")
+        if not ((self.goal > self.room_low).all() and (self.goal < self.room_high).all()):
+            raise InputError(f"Expected a goal inside {room}, got {_text(self.goal)}.")
+        low, high = self.obstacles[:, 0], self.obstacles[:, 1]
+        for what, place, within in (
+            ("base", self.base, (self.base > low) & (self.base < high)),
+            ("goal", self.goal, (self.goal >= low) & (self.goal <= high)),
+        ):
+            if within.all(axis=1).any():
+                # One of the walls, which come first: the place is not beyond a side of the room.
+                box = self.walls[int(np.argmax(within.all(axis=1)))]
+                raise InputError(
+                    f"Expected a {what} in the free space, got {_text(place)}, which is in the obstacle from "
+                    f"{_text(box[0])} to {_text(box[1])}."
+                )
+        end = self.base + self.straight * self.heading
+        if not ((end > self.room_low).all() and (end < self.room_high).all()):
             raise InputError(
-                f"Expected a {what} in the room, from {_text(self.room_low)} to {_text(self.room_high)}, got "
-                f"{_text(place)}."
-            )
-        inside = ((place > self.obstacles[:, 0]) & (place < self.obstacles[:, 1])).all(axis=1)
-        if inside.any():
-            box = self.obstacles[int(np.argmax(inside))]
-            raise InputError(
-                f"Expected a {what} in the free space, got {_text(place)}, which is in the obstacle from "
-                f"{_text(box[0])} to {_text(box[1])}."
+                f"Expected a straight stretch of {self.straight:g} from the base {_text(self.base)} that "
+                f"ends inside {room}, got its end at {_text(end)}."
             )
 
     def base_pose_for(self, link_length: float) -> FloatArray:
@@ -244,8 +248,8 @@ class Workspace:
         ahead = self._free_along(self.heading, arm.link_radius)
         if ahead < self.straight:
             raise InputError(
-                f"Expected a straight feed of {self.straight:g} {self.units} past the base of workspace "
-                f"'{self.name}' to be free for links of radius {arm.link_radius:g}, got {ahead:g}."
+                f"Expected {self.straight:g} {self.units} of straight free way past the base of workspace "
+                f"'{self.name}' for links of radius {arm.link_radius:g}, got {ahead:g}."
             )
         if arm.link_length > self.straight + behind:
             raise InputError(
@@ -257,10 +261,13 @@ class Workspace:
     def _free_along(self, way: FloatArray, radius: float) -> float:
         """Return how far from the base the way is free for a rod of a radius; infinite without obstacles.
 
-        Obstacles are grown by the radius along each axis, which is a little too much at their edges.
+        What is wholly behind the base does not count: the feeder's own wall is as near as one likes. Touching
+        is free. Obstacles are grown by the radius along each axis, which is a little too much at their edges.
         """
-        low, high = self.obstacles[:, 0] - radius, self.obstacles[:, 1] + radius
-        with np.errstate(divide="ignore", invalid="ignore"):
+        faces = self.obstacles - self.base
+        obstacles = self.obstacles[np.maximum(faces[:, 0] * way, faces[:, 1] * way).sum(axis=1) > 0.0]
+        low, high = obstacles[:, 0] - radius, obstacles[:, 1] + radius
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             near, far = (low - self.base) / way, (high - self.base) / way
         enter, leave = np.fmin(near, far), np.fmax(near, far)
         across = way == 0.0
@@ -286,11 +293,13 @@ class Workspace:
             data = json.loads(path.read_text(encoding="utf-8"))
         except FileNotFoundError:
             raise InputError(f"Expected a workspace file at '{path}', but there is none.") from None
-        except (OSError, UnicodeDecodeError) as error:
+        except OSError as error:
             raise InputError(
-                f"Expected a workspace file at '{path}' that can be read, got: {error}."
+                f"Expected a workspace file at '{path}' that can be read, got: {error.strerror}."
             ) from None
-        except json.JSONDecodeError as error:
+        except UnicodeDecodeError:
+            raise InputError(f"Expected text (UTF-8) in '{path}', got a file that is none.") from None
+        except (ValueError, RecursionError) as error:
             raise InputError(f"Expected JSON in '{path}', got a file that is not: {error}.") from None
         return cls.from_dict(data, default_name=path.stem)
 
@@ -314,8 +323,8 @@ class Workspace:
         _check_keys(goal, "the goal", of_goal, of_goal)
         panels, boxes = (_list(data.get(key, []), key) for key in ("panels", "boxes"))
         return cls(
-            name=str(data.get("name", default_name)),
-            units=str(data.get("units", "units")),
+            name=_string(data.get("name", default_name), "the name of a workspace"),
+            units=_string(data.get("units", "units"), "the units of a workspace"),
             room_low=room["low"],
             room_high=room["high"],
             open_sides=tuple(_list(room.get("open", []), "the open sides of the room")),
@@ -380,21 +389,57 @@ def _store(record: Any, key: str, array: FloatArray) -> None:
 
 
 def _vector(value: Any, what: str) -> FloatArray:
-    vector = numbers(what, value)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InputError(f"Expected {what} as three finite numbers (x, y, z), got {value!r}.")
+    try:
+        vector = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        vector = np.empty(0)
+    # NumPy takes True and "1" for numbers.
+    if vector.shape != (3,) or not np.isfinite(vector).all() or not all(map(is_number, value)):
+        came = " ".join(repr(value).split())
+        raise InputError(f"Expected {what} as three finite numbers (x, y, z), got {came}.")
     return vector
+
+
+def _unit(vector: FloatArray) -> FloatArray:
+    """Return a vector of length 1 along another; itself if it is one but for rounding."""
+    if abs(math.hypot(*vector) - 1.0) <= 4.0 * np.finfo(np.float64).eps:
+        return vector
+    # First by the largest number, as squares may be too large or too small.
+    vector = vector / np.abs(vector).max()
+    return np.asarray(vector / math.hypot(*vector), dtype=np.float64)
+
+
+def _positive(value: Any, what: str) -> float:
+    if not is_number(value) or not 0.0 < value <= sys.float_info.max:
+        raise InputError(f"Expected {what} to be positive and finite, got {value!r}.")
+    return float(value)
+
+
+def _string(value: Any, what: str) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"Expected {what} as a text, got {_kind(value)}.")
+    return value
+
+
+def _boxes(value: Any) -> FloatArray:
+    boxes = numbers("boxes", [] if value is None else value)
+    if boxes.shape == (0,):
+        return boxes.reshape(0, 2, 3)
+    if boxes.ndim != 3 or boxes.shape[1:] != (2, 3):
+        raise InputError(f"Expected boxes with shape (n_boxes, 2, 3), got {boxes.shape}.")
+    for number, (low, high) in enumerate(value):
+        what = f"a corner of box {number}"
+        _check_box(_vector(low, what), _vector(high, what), f"box {number}")
+    return boxes
 
 
 def _store_box(record: Any, low: str, high: str, what: str) -> None:
     for key in (low, high):
-        _store(record, key, _vector(getattr(record, key), f"a corner of the {what}"))
+        _store(record, key, _vector(getattr(record, key), f"a corner of {what}"))
     _check_box(getattr(record, low), getattr(record, high), what)
 
 
 def _check_box(low: FloatArray, high: FloatArray, what: str) -> None:
-    if not (np.isfinite(low).all() and np.isfinite(high).all()):
-        raise InputError(f"Expected {what} with finite corners, got {_text(low)} and {_text(high)}.")
     if not (low < high).all():
         raise InputError(
             f"Expected {what} with a low corner below its high corner along every axis, got {_text(low)} and "
@@ -429,7 +474,10 @@ def _panel(data: Any, number: int) -> Panel:
     _check_keys(data, what, ("low", "high", "normal", "window"), ("low", "high", "normal", "window"))
     low, high = _corners({"low": data["low"], "high": data["high"]}, what)
     window = _corners(data["window"], f"the window of {what}")
-    return Panel(low=low, high=high, normal=data["normal"], window_low=window[0], window_high=window[1])
+    try:
+        return Panel(low=low, high=high, normal=data["normal"], window_low=window[0], window_high=window[1])
+    except InputError as error:
+        raise InputError(f"{str(error).removesuffix('.')} ({what}).") from None
 
 
 def _kind(data: Any) -> str:
