@@ -32,7 +32,7 @@ from planners.spatial.workspace import AXES, Workspace
 
 __all__ = ["Face", "Solid", "draw_motion", "feeder_ends", "rectangles", "solids"]
 
-VIEWS = ((-58.0, 26.0), (-32.0, 58.0))
+VIEWS = ((-58.0, 26.0), (-78.0, 62.0))
 """From where the two views look: azimuth and elevation in degrees."""
 
 SOLID, FLOOR, BACK, GRID = "#97a3b4", "#f1f3f6", "#fafbfc", "#e1e4e9"
@@ -43,7 +43,7 @@ LIGHT = ((0.90, 0.98), (0.82, 0.94), (0.80, 1.08))
 """Brightness of faces along each axis, turned to its low and to its high end."""
 
 DPI = 200
-WIDTH, MARGIN, HEAD, FOOT = 6.0, 0.28, 0.42, 0.34
+WIDTH, MARGIN, HEAD, FOOT = 6.0, 0.52, 0.42, 0.34
 """Of one view in inches, about the room; above it for the title, below it for the legend."""
 
 LINK_WIDTH, JOINT_WIDTH = 2.6, 3.6
@@ -366,10 +366,12 @@ class _View:
             way /= np.linalg.norm(way)
             flat = self.flat(places)
             style: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 9, "color": "#5b6470"}
-            for tick, place in zip(ticks[axis], flat[:-1], strict=True):
+            for tick, place in list(zip(ticks[axis], flat[:-1], strict=True))[int(axis == 2) :]:
                 axes.text(*(place + 0.026 * size * way), f"{tick:g}", fontsize=7, **style)
             name = f"{AXES[axis]} ({self.workspace.units})"
-            axes.text(*(flat[-1] + 0.062 * size * way), name, fontsize=8, **style)
+            away = 0.065 + 0.035 * abs(way[0]) * (axis != 2)  # letters are wider than high
+            turn = 90.0 if axis == 2 else 0.0
+            axes.text(*(flat[-1] + away * size * way), name, fontsize=8, rotation=turn, **style)
 
 
 def _ticks(low: FloatArray, high: FloatArray) -> list[FloatArray]:
@@ -400,6 +402,7 @@ def _arm_strokes(
     feeder: FloatArray,
     width: float,
     share: float,
+    joint_width: float,
     size: float,
 ) -> Iterator[_Stroke]:
     """Yield the links in short pieces, and the joints; `share` below 1 fades them."""
@@ -421,8 +424,7 @@ def _arm_strokes(
             yield _Stroke(start=a, end=b, colour=tint, width=width * (1.25 if hit else 1.0), lift=0.004 * size)
         for place in (start, end):
             if share == 1.0 and not (place is feeder[0]):
-                big = max(JOINT_WIDTH, 1.3 * width)
-                yield _Stroke(start=place, end=place + dot, colour=joint, width=big, lift=0.02 * size)
+                yield _Stroke(start=place, end=place + dot, colour=joint, width=joint_width, lift=0.02 * size)
 
 
 def draw_motion(
@@ -480,6 +482,9 @@ def draw_motion(
     figure = Figure(figsize=(WIDTH * len(seen), height + HEAD + FOOT), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
     width = max(LINK_WIDTH, 144.0 * link_radius * scale)
+    # Joints that stand close together would hide the links.
+    close = 72.0 * motion.link_length * scale < 2.5 * JOINT_WIDTH
+    joint_width = 0.5 * width if close else max(JOINT_WIDTH, 1.3 * width)
     for number, view in enumerate(seen):
         axes = figure.add_axes(
             (number / len(seen), FOOT / (height + HEAD + FOOT), 1 / len(seen), height / (height + HEAD + FOOT))
@@ -488,7 +493,7 @@ def draw_motion(
         middle, half = 0.5 * (view.low + view.high), 0.5 * np.array([WIDTH, height]) / scale
         axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
         axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
-        strokes = list(_inside(workspace, motion, path, shown, measured, feeder, width))
+        strokes = list(_inside(workspace, motion, path, shown, measured, feeder, (width, joint_width)))
         view.draw(axes, strokes)
         _mark_ends(axes, view, workspace)
     figure.text(
@@ -499,7 +504,7 @@ def draw_motion(
         va="center",
         fontsize=11,
     )
-    _add_legend(figure, motion, path, measured, workspace)
+    _add_legend(figure, path, None if measured is None else measured[shown])
     with replacing(picture) as part:
         figure.savefig(part, facecolor="white")
 
@@ -524,12 +529,12 @@ def _inside(
     poses: list[int],
     distances: FloatArray | None,
     feeder: FloatArray,
-    width: float,
+    widths: tuple[float, float],
 ) -> Iterator[_Stroke]:
-    """Yield what is in the room: feeder, path, the arm in its poses."""
-    size = workspace.size
+    """Yield what is in the room: feeder, path, the arm in its poses; widths are those of links and joints."""
+    size, (width, joint_width) = workspace.size, widths
     grey = tuple(channel / 255.0 for channel in rgb("base"))
-    yield _Stroke(start=feeder[0], end=feeder[1], colour=grey, width=2.4 * width, lift=-0.01 * size)
+    yield _Stroke(start=feeder[0], end=feeder[1], colour=grey, width=2.4 * width, lift=0.05 * size)
     if path is not None:
         points = np.asarray(path, dtype=np.float64)
         step = max(1, len(points) // 400)
@@ -544,7 +549,13 @@ def _inside(
             colours = [rgb("collision") if d < 0.0 else c for c, d in zip(colours, clear, strict=True)]
         share = 1.0 if number == len(poses) - 1 else 0.25 + 0.35 * number / max(len(poses) - 1, 1)
         yield from _arm_strokes(
-            motion.joints[pose], colours, feeder=feeder, width=width, share=share, size=size
+            motion.joints[pose],
+            colours,
+            feeder=feeder,
+            width=width,
+            share=share,
+            joint_width=joint_width,
+            size=size,
         )
 
 
@@ -553,7 +564,7 @@ def _mark_ends(axes: Axes, view: _View, workspace: Workspace) -> None:
     axes.plot(*goal, "o", color=COLOURS["goal"], markersize=6.5, markeredgecolor="white", zorder=8)
     style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8, "zorder": 9, "weight": "bold"}
     axes.annotate("goal", goal, (0, -11), ha="center", color=COLOURS["goal"], **style)
-    axes.annotate("feeder", base, (0, -12), ha="center", color=COLOURS["base"], **style)
+    axes.annotate("feeder", base, (4, 9), ha="center", color=COLOURS["base"], **style)
 
 
 def _title(workspace: Workspace, motion: SpatialMotion, distances: FloatArray | None, pose: int) -> str:
@@ -564,13 +575,12 @@ def _title(workspace: Workspace, motion: SpatialMotion, distances: FloatArray | 
     return text + (f": {-least:.3g} deep in a wall" if least < 0.0 else f": {least:.3g} clear of the walls")
 
 
-def _add_legend(
-    figure: Figure, motion: SpatialMotion, path: FloatArray | None, distances: FloatArray | None, room: Workspace
-) -> None:
+def _add_legend(figure: Figure, path: FloatArray | None, distances: FloatArray | None) -> None:
     lines = [Line2D([], [], color=COLOURS["arm"], linewidth=3.0, label="link")]
     if distances is not None:
-        near = Line2D([], [], color=COLOURS["near"], linewidth=3.0, label="link near a wall")
-        lines += [near, Line2D([], [], color=COLOURS["collision"], linewidth=3.4, label="link in a wall")]
+        lines.append(Line2D([], [], color=COLOURS["near"], linewidth=3.0, label="link near a wall"))
+        if distances.min() < 0.0:
+            lines.append(Line2D([], [], color=COLOURS["collision"], linewidth=3.4, label="link in a wall"))
     if path is not None:
         dashes: Any = (0, (3, 1.5))
         lines.append(Line2D([], [], color="#1c2128", linewidth=1.0, linestyle=dashes, label="path of a point"))
