@@ -22,11 +22,11 @@ from hrsnake_env.arm import FloatArray
 from hrsnake_env.contacts import PINCH_TOLERANCE
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
-from planners.spatial.drawing import rectangles, solids
 from planners.spatial.problem import SpatialMotion
+from planners.spatial.solids import rectangles, solids
 from planners.spatial.workspace import Workspace
 
-__all__ = ["MOST_POSES", "QUANTUM", "Scene", "page_html", "save_page", "show"]
+__all__ = ["MOST_POSES", "QUANTUM", "Scene", "kept_poses", "page_html", "save_page", "show"]
 
 MOST_POSES = 400
 """So many poses of a motion a page holds at most."""
@@ -53,8 +53,8 @@ class Scene:
     path : array, shape (n, 3), or None
         The path of the point robot.
     distances : array, shape (n_poses, n_links), or None
-        Of each link from the walls, in workspace units; negative is the depth in them, infinite is a link that
-        was not measured, such as one in the feeder.
+        Of each link from the walls, in workspace units; negative is the depth in them. It is infinite where it
+        was not measured, as in the feeder.
     link_radius : float
         In workspace units.
 
@@ -154,9 +154,7 @@ def page_html(scenes: Sequence[Scene], *, title: str | None = None, most_poses: 
     parts = {"TITLE": html.escape(heading), "PAYLOAD": _json_in_html(payload)}
     template = importlib.resources.files("planners.spatial").joinpath("viewer.html")
     # In one go, so that nothing in a title is taken for a place to fill.
-    return re.sub(
-        "__(TITLE|PAYLOAD)__", lambda place: parts[place[1]], template.read_text(encoding="utf-8")
-    )
+    return re.sub("__(TITLE|PAYLOAD)__", lambda place: parts[place[1]], template.read_text(encoding="utf-8"))
 
 
 def show(scenes: Sequence[Scene], height: int = 720, *, title: str | None = None) -> Any:
@@ -258,7 +256,7 @@ def _signed(distances: FloatArray) -> FloatArray:
 
 
 def _packed(table: FloatArray) -> str:
-    """Pack numbers, rounded: differences along axis 0, column by column, 32 bits each, deflated, in base64."""
+    """Pack numbers, rounded: differences along axis 0, column by column, 32 bits, deflated, base64."""
     whole = np.diff(np.rint(table).astype(np.int64), axis=0, prepend=0)
     # A difference may need 33 bits; it wraps, and so does the sum.
     data = whole.T.astype(np.uint64).astype("<u4").tobytes()
