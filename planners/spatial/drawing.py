@@ -36,6 +36,7 @@ VIEWS = ((-58.0, 26.0), (-78.0, 62.0))
 """From where the two views look: azimuth and elevation in degrees."""
 
 SOLID, FLOOR, BACK, GRID = "#97a3b4", "#f1f3f6", "#fafbfc", "#e1e4e9"
+INK, SOFT = "#1c2128", "#5b6470"
 GLASS = 0.15
 """How much a wall hides of what is behind it."""
 
@@ -170,7 +171,7 @@ class _View:
             way = self.flat(aside)
             way /= np.linalg.norm(way)
             flat = self.flat(places)
-            style: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 9, "color": "#5b6470"}
+            style: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 9, "color": SOFT}
             for tick, place in list(zip(ticks[axis], flat[:-1], strict=True))[int(axis == 2) :]:
                 x, y = place + 0.026 * size * way
                 axes.text(x, y, f"{tick:g}", fontsize=7, **style)
@@ -366,7 +367,7 @@ def _inside(
         points = np.concatenate([points[:-1:step], points[-1:]])
         for k, (a, b) in enumerate(itertools.pairwise(points)):
             if k % 3 != 2:  # dashes
-                yield Stroke(start=a, end=b, colour=(0.11, 0.13, 0.16, 0.9), width=1.0, lift=-0.002 * size)
+                yield Stroke(start=a, end=b, colour=INK, width=1.0, lift=-0.002 * size)
     for number, pose in enumerate(poses):
         clear = None if distances is None else distances[pose]
         colours = link_colours(motion.n_links, clearances=clear, link_length=motion.link_length)
@@ -402,8 +403,6 @@ def _legend(path: FloatArray | None, distances: FloatArray | None) -> list[Line2
         if distances.min() < 0.0:
             lines.append(Line2D([], [], color=COLOURS["collision"], linewidth=3.4, label="link in a wall"))
     if path is not None:
-        dashes: Any = (0, (3, 1.5))
-        lines.append(
-            Line2D([], [], color="#1c2128", linewidth=1.0, linestyle=dashes, label="path of a point")
-        )
+        dashed: dict[str, Any] = {"color": INK, "linewidth": 1.0, "linestyle": (0, (3, 1.5))}
+        lines.append(Line2D([], [], label="path of a point", **dashed))
     return lines

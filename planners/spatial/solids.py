@@ -146,8 +146,8 @@ class Stroke:
 def from_behind(faces: list[Face], strokes: list[Stroke], out: FloatArray) -> Iterator[Face | Stroke]:
     """Yield faces and strokes, cut where they pass a face, in the order in which they cover each other.
 
-    The plane of a face parts all the rest, and so on on either side, until a part holds strokes alone (a binary
-    space partition); these are sorted by how far away their middle is.
+    The plane of a face parts all the rest, and so on, until a part holds strokes alone (a binary space
+    partition); these are sorted by how far away their middle is.
 
     Parameters
     ----------

@@ -53,8 +53,8 @@ class Scene:
     path : array, shape (n, 3), or None
         The path of the point robot.
     distances : array, shape (n_poses, n_links), or None
-        Of each link from the walls, in workspace units; negative is the depth in them. It is infinite where it
-        was not measured, as in the feeder.
+        Of each link from the walls, in workspace units; negative is the depth in them. Infinite where it was
+        not measured, as in the feeder.
     link_radius : float
         In workspace units.
 
