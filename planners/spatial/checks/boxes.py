@@ -100,10 +100,11 @@ def separations(
     shares = _middle_inside(start, end, low, high)
     apart = np.flatnonzero(signed > 0.0)
     distance, normal, share = _distances(start[apart], end[apart], low[apart], high[apart])
-    # Rounding may find a point inside where an axis finds a gap.
-    sure = distance >= signed[apart]
-    apart = apart[sure]
-    signed[apart], normals[apart], shares[apart] = distance[sure], normal[sure], share[sure]
+    shares[apart] = share
+    # What an axis shows already is left to it: differences of rounding have no direction.
+    more = distance > signed[apart] + 1e-12 * np.abs(start[apart]).max(axis=1, initial=1.0)
+    apart = apart[more]
+    signed[apart], normals[apart] = distance[more], normal[more]
     return signed, normals, shares
 
 

@@ -64,7 +64,7 @@ class Moves:
     def ways(self) -> FloatArray:
         """How far points of the segments move, from the first time to any and on to the last; shape (n,)."""
         way = np.linalg.norm(self.after - self.before, axis=2)
-        return np.where(self.even, way.max(axis=1), way.sum(axis=1))
+        return np.asarray(np.where(self.even, way.max(axis=1), way.sum(axis=1)))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -83,7 +83,8 @@ class Scene:
     @property
     def boxes(self) -> FloatArray:
         """The obstacles, shape (n_boxes, 2, 3)."""
-        return self.workspace.obstacles
+        obstacles: FloatArray = self.workspace.obstacles
+        return obstacles
 
     @property
     def tolerance(self) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from hrsnake_env.arm import FloatArray
 from planners.problem import Fault, Progress
 from planners.spatial.checks.boxes import axis_gaps, frame_gaps, separations
-from planners.spatial.checks.scene import ROUNDING, BoolArray, Scene, point_of, slices
+from planners.spatial.checks.scene import ROUNDING, BoolArray, IntArray, Scene, point_of, slices
 
 __all__ = ["check_poses", "nearest_of_each"]
 
@@ -24,7 +24,7 @@ def check_poses(scene: Scene, tell: Progress) -> tuple[float, Fault | None, Bool
         joints = scene.in_workspace(motion.joints[part], arc)
         pose, link = np.nonzero(arc[:, 1:] > ROUNDING * scene.length)
         start, end = joints[pose, link], joints[pose, link + 1]
-        row, box, distance, share = _nearest(start, end, scene.boxes, clearance + radius, radius)
+        row, distance, share = _nearest(start, end, scene.boxes, clearance + radius, radius)
         of_deep = row[distance - radius < -scene.tolerance]
         deep[part][pose[of_deep], link[of_deep]] = True
         if len(row) and distance.min() - radius < clearance:
@@ -48,30 +48,30 @@ def check_poses(scene: Scene, tell: Progress) -> tuple[float, Fault | None, Bool
 
 def _nearest(
     start: FloatArray, end: FloatArray, boxes: FloatArray, beat: float, always: float
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+) -> tuple[IntArray, FloatArray, FloatArray]:
     """Compute the signed distances of segments to boxes that may be the least of all and less than `beat`.
 
-    Those below `always` are computed too. Return numbers of segments and boxes, distances, and shares.
+    Those below `always` are computed too. Return the numbers of the segments, distances, and shares.
     """
+
+    def measured(row: IntArray, box: IntArray) -> tuple[FloatArray, FloatArray]:
+        distance, _, share = separations(start[row], end[row], boxes[box, 0], boxes[box, 1])
+        return distance, share
+
     gaps = frame_gaps(np.minimum(start, end), np.maximum(start, end), boxes)
-    limit = max(beat, always)
-    row, box = np.nonzero(gaps < limit)
-    found: list[tuple[FloatArray, ...]] = []
+    # The likely nearest first: it sets most of the others aside.
+    limit = beat
+    if gaps.size:
+        likely = np.array([np.argmin(gaps)])
+        limit = min(limit, float(measured(*np.divmod(likely, len(boxes)))[0][0]))
+    row, box = np.nonzero(gaps <= max(limit, always))
     if len(row):
-        bound = axis_gaps(start[row], end[row], boxes[box, 0], boxes[box, 1]).max(axis=1)
-        # The likely nearest first: it sets most of the others aside.
-        first = np.argmin(bound)
-        limit = max(min(limit, _measured(start, end, boxes, row[[first]], box[[first]])[2][0]), always)
-        near = bound <= limit
-        found.append(_measured(start, end, boxes, row[near], box[near]))
-    else:
-        found.append(_measured(start, end, boxes, row, box))
-    return found[0]
-
-
-def _measured(start, end, boxes, row, box):
-    distance, _, share = separations(start[row], end[row], boxes[box, 0], boxes[box, 1])
-    return row, box, distance, share
+        bounds = axis_gaps(start[row], end[row], boxes[box, 0], boxes[box, 1]).max(axis=1)
+        first = np.array([np.argmin(bounds)])
+        limit = min(limit, float(measured(row[first], box[first])[0][0]))
+        near = bounds <= max(limit, always)
+        row, box = row[near], box[near]
+    return row, *measured(row, box)
 
 
 def nearest_of_each(start: FloatArray, end: FloatArray, boxes: FloatArray) -> FloatArray:
