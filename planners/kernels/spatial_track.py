@@ -195,10 +195,10 @@ def _push_chord(
 
 @njit(cache=True)
 def _squared(points: FloatArray, i: int, k: int) -> float:
-    total: float = 0.0
+    total = 0.0
     for c in range(3):
         total += (points[k, c] - points[i, c]) ** 2
-    return total
+    return float(total)
 
 
 @njit(cache=True)
