@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from hrsnake_env.arm import ArmSpec
@@ -516,6 +516,25 @@ def test_links_that_pass_each_other_keep_twice_the_radius_apart():
         assert kinds_of(report) & {"crossing"} == kinds
     fault = fault_of(report, "crossing")
     assert "of each other" in fault.message and fault.amount <= 2.0 * radius + ROUNDING * LENGTH
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.02, 0.2]), st.sampled_from([0.97, 1.03]))
+def test_links_are_found_nearer_than_twice_the_radius_exactly_when_samples_between_poses_are(seed, size, share):
+    rng = np.random.default_rng(seed)
+    angles = rng.uniform(-1.8, 1.8, (1, 5, 2)) + np.array([0.0, 1.0])[:, None, None] * rng.uniform(
+        -size, size, (1, 5, 2)
+    )
+    workspace = space()
+    motion = moved(workspace, [50.0, 50.0], angles)
+    joints = poses_between(motion, np.linspace(0.0, 1.0, 801))
+    closest = min(
+        segment_distances(joints[:, i], joints[:, i + 1], joints[:, j], joints[:, j + 1]).min()
+        for i, j in zip(*np.triu_indices(5, 2), strict=True)
+    )
+    assume(0.5 < closest < 9.0)
+    arm = ArmSpec(link_length=LENGTH, link_radius=share * closest / 2.0)
+    assert ("crossing" in kinds_of(validate(motion, workspace, arm))) == (share > 1.0)
 
 
 def test_links_that_change_sides_between_two_poses_cross():
