@@ -233,13 +233,8 @@ def _arm_strokes(
         for a, b in itertools.pairwise(np.linspace(start, end, n_pieces + 1)):
             yield Stroke(start=a, end=b, colour=_tint(colour, share), width=width, lift=lift)
         for place in (start, end) if share == 1.0 else ():
-            yield Stroke(
-                start=place,
-                end=place + dot,
-                colour=_tint(rgb("joint")),
-                width=widths[1],
-                lift=lift + 0.016 * size,
-            )
+            above, colour = lift + 0.016 * size, rgb("joint")
+            yield Stroke(start=place, end=place + dot, colour=_tint(colour), width=widths[1], lift=above)
 
 
 def _tint(colour: RGB, share: float = 1.0) -> tuple[float, ...]:
@@ -370,7 +365,7 @@ def _inside(
 ) -> Iterator[Stroke]:
     """Yield what is in the room: feeder, path, the arm in its poses; widths are those of links and joints."""
     size, sleeve = workspace.size, 2.4 * widths[0]
-    yield Stroke(start=feeder[0], end=feeder[1], colour=_tint(rgb("base")), width=sleeve, lift=0.05 * size)
+    yield Stroke(start=feeder[0], end=feeder[1], colour=_tint(rgb("base")), width=sleeve, lift=size)
     if path is not None:
         points = np.asarray(path, dtype=np.float64)
         step = max(1, len(points) // 400)
@@ -396,7 +391,7 @@ def _mark_ends(axes: Axes, view: _View, workspace: Workspace) -> None:
     style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8, "zorder": 10, "weight": "bold"}
     style["path_effects"] = [withStroke(linewidth=2.2, foreground="white")]
     axes.annotate("goal", goal, (0, -11), ha="center", color=COLOURS["goal"], **style)
-    axes.annotate("feeder", base, (4, 9), ha="center", color=COLOURS["base"], **style)
+    axes.annotate("feeder", base, (2, -13), ha="center", color=COLOURS["base"], **style)
 
 
 def _title(workspace: Workspace, motion: SpatialMotion, distances: FloatArray | None, pose: int) -> str:
