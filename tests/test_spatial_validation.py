@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from hrsnake_env.arm import ArmSpec
@@ -264,48 +264,79 @@ def test_third_derivatives_are_bounded(drawn):
     assert (seen <= 1.001 * scene.third[0] + 1e-3).all()
 
 
+def grazing(joints, rng, depth):
+    """Build a box that the arm gets about `depth` deep in over poses, shape (n_poses, n_links + 1, 3)."""
+    middle = joints[len(joints) // 2, rng.integers(1, joints.shape[1])]
+    way, size = rng.normal(size=3), rng.uniform(0.3, 3.0, size=3)
+    way /= np.linalg.norm(way)
+    starts, ends = joints[:, :-1].reshape(-1, 3), joints[:, 1:].reshape(-1, 3)
+
+    def box_at(shift):
+        return np.stack([middle + shift * way - size, middle + shift * way + size])
+
+    near, far = 0.0, 60.0
+    for _ in range(40):
+        shift = (near + far) / 2.0
+        box = np.tile(box_at(shift)[None], (len(starts), 1, 1))
+        gets = -separations(starts, ends, box[:, 0], box[:, 1])[0].min()
+        near, far = (shift, far) if gets > depth else (near, shift)
+    return box_at(near)
+
+
+def poses_between(motion, times):
+    """Return the joints at times after the first pose, in [0, 1]."""
+    feeds = motion.feed[0] + times * np.diff(motion.feed)
+    angles = motion.joint_angles[0] + times[:, None, None] * np.diff(motion.joint_angles, axis=0)
+    return joints_from_configuration(feeds, angles, LENGTH, motion.base_pose)
+
+
+def least_distance(motion, workspace, radius, accuracy=1e-4):
+    """Find the least signed distance between two poses: what cannot be lower for its speed is set aside."""
+    turns = np.hypot(*np.diff(motion.joint_angles, axis=0)[0].T)
+    speed = np.abs(np.diff(motion.feed)[0]) + LENGTH * turns @ np.arange(len(turns), 0, -1)
+    least, width, middles = math.inf, 1.0 / 64.0, (np.arange(64) + 0.5) / 64.0
+    while len(middles):
+        joints = poses_between(motion, middles)
+        found = signed_distances(joints, workspace, motion.base_pose, radius).min(axis=1)
+        least = min(least, found.min())
+        if width * speed <= accuracy:
+            break
+        middles = middles[found - speed * width / 2.0 < least]
+        width /= 4.0
+        middles = (middles[:, None] + width * np.array([-1.5, -0.5, 0.5, 1.5])).ravel()
+    return least
+
+
 @settings(max_examples=60)
 @given(
     st.integers(1, 4),
     st.integers(0, 2**32 - 1),
     st.sampled_from([0.0, 0.3]),
-    st.sampled_from([0.01, 0.1, 0.4]),
+    st.sampled_from([0.03, 0.1, 0.3]),
+    st.floats(-1.0, 3.0),
 )
-def test_the_depth_between_poses_is_at_most_what_is_reported(n_links, seed, radius, size):
-    """Boxes stand beside the arm half way, so that the bound matters."""
-    rng = np.random.default_rng(seed)
-    angles = rng.uniform(-1.0, 1.0, (1, n_links, 2)) + np.array([-0.5, 0.5])[:, None, None] * rng.uniform(
-        -size, size, (1, n_links, 2)
-    )
-    feeds = n_links * LENGTH + np.array([0.0, rng.uniform(-0.2, 0.2)])
-    halfway = joints_from_configuration(
-        [feeds.mean()], angles.mean(axis=0, keepdims=True), LENGTH, (0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
-    )[0]
-    found = []
-    for _ in range(4):
-        link = rng.integers(n_links)
-        place = halfway[link] + rng.uniform() * (halfway[link + 1] - halfway[link])
-        corner = place + rng.normal(size=3) * 0.05
-        way = rng.choice([-1.0, 1.0], size=3) * rng.uniform(1.0, 5.0, size=3)
-        box = np.sort(np.stack([corner, corner + way]), axis=0)
-        if not ((box[0] < 0.0) & (box[1] > 0.0)).all():
-            found.append(box)
-    workspace = space(*found)
-    report = validate(moved(workspace, feeds, angles), workspace, ArmSpec(link_length=LENGTH, link_radius=radius))
-    times = np.linspace(0.0, 1.0, 301)
-    seen = moved(
-        workspace,
-        feeds[0] + times * np.diff(feeds),
-        angles[0] + times[:, None, None] * np.diff(angles, axis=0),
-    )
-    distances = signed_distances(seen.joints, workspace, seen.base_pose, radius).min(axis=1)
-    depth = -distances.min()
+def test_the_depth_between_poses_is_at_most_what_is_reported(n_links, seed, radius, size, depths):
+    """A box grazes the arm somewhere between the poses, so that the bound matters."""
+    rng, tolerance = np.random.default_rng(seed), PINCH_TOLERANCE * LENGTH
+    change = np.array([-0.5, 0.5])[:, None, None] * rng.uniform(-size, size, (1, n_links, 2))
+    angles = rng.uniform(-1.0, 1.0, (1, n_links, 2)) + change
+    motion = moved(space(), n_links * LENGTH + np.array([0.0, rng.uniform(-0.2, 0.2)]), angles)
+    seen = poses_between(motion, np.linspace(0.0, 1.0, 101))
+    box = grazing(seen, rng, depths * tolerance - radius)
+    workspace = space() if ((box[0] < 0.0) & (box[1] > 0.0)).all() else space(box)
+    at_poses = float(signed_distances(motion.joints, workspace, motion.base_pose, radius).min())
+    depth = -min(least_distance(motion, workspace, radius), at_poses)
+
+    report = validate(motion, workspace, ArmSpec(link_length=LENGTH, link_radius=radius))
+    kinds = kinds_of(report)
     assert depth <= report.penetration_between + ROUNDING * LENGTH
-    assert report.clearance == pytest.approx(min(distances[0], distances[-1]), abs=1e-9)
-    assert ("penetration" in kinds_of(report)) == (min(distances[0], distances[-1]) < -ROUNDING * LENGTH)
-    if depth < 0.9 * PINCH_TOLERANCE * LENGTH:
-        assert "sweep" not in kinds_of(report)
-        assert report.penetration_between <= PINCH_TOLERANCE * LENGTH
+    assert report.clearance == pytest.approx(at_poses, abs=1e-9)
+    assert ("penetration" in kinds) == (at_poses < -ROUNDING * LENGTH)
+    if depth > tolerance * (1.0 + 1e-6):
+        assert kinds & {"sweep", "penetration"}
+    if depth < 0.9 * tolerance:
+        assert "sweep" not in kinds
+        assert report.penetration_between <= tolerance
 
 
 @pytest.mark.parametrize("depth", [-0.5, 0.5, 0.8, 1.2, 3.0, 30.0])
@@ -485,6 +516,25 @@ def test_links_that_pass_each_other_keep_twice_the_radius_apart():
         assert kinds_of(report) & {"crossing"} == kinds
     fault = fault_of(report, "crossing")
     assert "of each other" in fault.message and fault.amount <= 2.0 * radius + ROUNDING * LENGTH
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.02, 0.2]), st.sampled_from([0.97, 1.03]))
+def test_links_are_found_nearer_than_twice_the_radius_exactly_when_samples_between_poses_are(seed, size, share):
+    rng = np.random.default_rng(seed)
+    angles = rng.uniform(-1.8, 1.8, (1, 5, 2)) + np.array([0.0, 1.0])[:, None, None] * rng.uniform(
+        -size, size, (1, 5, 2)
+    )
+    workspace = space()
+    motion = moved(workspace, [50.0, 50.0], angles)
+    joints = poses_between(motion, np.linspace(0.0, 1.0, 801))
+    closest = min(
+        segment_distances(joints[:, i], joints[:, i + 1], joints[:, j], joints[:, j + 1]).min()
+        for i, j in zip(*np.triu_indices(5, 2), strict=True)
+    )
+    assume(0.5 < closest < 9.0)
+    arm = ArmSpec(link_length=LENGTH, link_radius=share * closest / 2.0)
+    assert ("crossing" in kinds_of(validate(motion, workspace, arm))) == (share > 1.0)
 
 
 def test_links_that_change_sides_between_two_poses_cross():
