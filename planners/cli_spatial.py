@@ -58,7 +58,7 @@ def plan_command(
         float, typer.Option("--time-budget", help="Seconds that planning may take.")
     ] = TIME_BUDGET,
     out: MotionOption = None,
-    picture: Annotated[Path | None, typer.Option("--picture", help="Draw three poses (.png).")] = None,
+    picture: Annotated[Path | None, typer.Option("--picture", help="Draw the last pose (.png, .svg, .pdf).")] = None,
     page: PageOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -223,7 +223,7 @@ def _show(
 
     distances = signed_distances(motion.joints, room, motion.base_pose, link_radius)
     if picture is not None:
-        poses = None if worst else [motion.n_poses // 3, 2 * motion.n_poses // 3, motion.n_poses - 1]
+        poses = None if worst else [-1]
         draw_motion(room, motion, path, picture, poses=poses, distances=distances, link_radius=link_radius)
     if page is not None:
         name = f"{motion.n_links} links of {motion.link_length:g}"

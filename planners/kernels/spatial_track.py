@@ -195,10 +195,10 @@ def _push_chord(
 
 @njit(cache=True)
 def _squared(points: FloatArray, i: int, k: int) -> float:
-    total = 0.0
+    total: float = 0.0
     for c in range(3):
         total += (points[k, c] - points[i, c]) ** 2
-    return float(total)
+    return total
 
 
 @njit(cache=True)
@@ -211,7 +211,7 @@ def _far_end(points: FloatArray, i: int, near: int, far: int, squared: float) ->
         half += step * way
         apart += way * way
     root = max(half * half - size * (apart - squared), 0.0)
-    return min(max((np.sqrt(root) - half) / max(size, 1e-300), 0.0), 1.0)
+    return float(min(max((np.sqrt(root) - half) / max(size, 1e-300), 0.0), 1.0))
 
 
 @njit(cache=True)

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.files import replacing
 from planners.problem import Progress, ValidationReport
@@ -153,16 +151,13 @@ def _measured(
 
 
 def _write(workspace: Workspace, path: SpatialPath, figure: SpatialFigure, folder: Path) -> None:
-    """Write a motion, and a picture of its worst pose or, if all are free, of several on the way."""
+    """Write a motion, and a picture of its worst pose or, if all are free, of the last."""
     figure.motion.save(folder / f"{figure.stem}.npz")
-    poses = None
-    if figure.error is None:
-        poses = np.linspace(0, figure.motion.n_poses - 1, 4).astype(int)[1:].tolist()
     draw_motion(
         workspace,
         figure.motion,
         path.points,
         folder / f"{figure.stem}.png",
-        poses=poses,
+        poses=None if figure.poses_that_collide else [-1],
         distances=figure.distances,
     )
