@@ -92,14 +92,14 @@ def distance_by_search(start, end, low, high):
         return np.linalg.norm(point - np.clip(point, low, high))
 
     near, far = 0.0, 1.0
-    for _ in range(120):
+    for _ in range(70):
         one, other = near + (far - near) / 3.0, far - (far - near) / 3.0
         near, far = (near, other) if away(one) <= away(other) else (one, far)
     return min(away((near + far) / 2.0), away(0.0), away(1.0))
 
 
 # Whole numbers make segments along edges, in faces and of no length at all.
-numbers = st.one_of(st.integers(-4, 4).map(float), st.floats(-5.0, 5.0))
+numbers = st.one_of(st.integers(-4, 4).map(float), st.floats(-5.0, 5.0).map(lambda value: round(value, 6)))
 points = st.tuples(numbers, numbers, numbers).map(np.array)
 boxes = st.tuples(points, st.tuples(*[st.floats(0.5, 6.0) | st.just(2.0)] * 3).map(np.array)).map(
     lambda pair: np.array([pair[0], pair[0] + pair[1]])
@@ -131,7 +131,7 @@ def test_the_depth_in_a_box_is_the_shortest_way_out(box, inside, along, share, r
     assert distance < 0.0
     out = normal * (-distance + 1e-7)
     assert distance_by_search(start + out, end + out, *box) > 1e-9
-    ways = np.random.default_rng(random.getrandbits(32)).normal(size=(30, 3))
+    ways = np.random.default_rng(random.getrandbits(32)).normal(size=(10, 3))
     for way in ways / np.linalg.norm(ways, axis=1, keepdims=True):
         short = -0.999 * distance * way
         assert distance_by_search(start + short, end + short, *box) < 1e-9
@@ -178,10 +178,10 @@ def test_the_distance_of_two_segments_is_the_least_between_their_points(a, b, c,
 
     def away(share):
         point, along = a + share * (b - a), d - c
-        where = np.clip((point - c) @ along / (along @ along), 0.0, 1.0) if along.any() else 0.0
+        where = np.clip((point - c) @ along / (along @ along), 0.0, 1.0) if (along @ along) > 0.0 else 0.0
         return np.linalg.norm(point - c - where * along)
 
-    for _ in range(120):
+    for _ in range(70):
         one, other = near + (far - near) / 3.0, far - (far - near) / 3.0
         near, far = (near, other) if away(one) <= away(other) else (one, far)
     assert found == pytest.approx(min(away((near + far) / 2.0), away(0.0), away(1.0)), abs=1e-7)
