@@ -345,6 +345,34 @@ def test_the_depth_between_poses_is_at_most_what_is_reported(n_links, seed, radi
         assert report.penetration_between <= tolerance
 
 
+@given(st.integers(0, 2**32 - 1), st.booleans())
+@settings(max_examples=40)
+def test_a_link_that_leaves_the_feeder_stays_within_the_bound_of_its_hull(seed, on_axis):
+    """Also where it leaves it beside the base, which is another fault."""
+    rng = np.random.default_rng(seed)
+    workspace, link = space(), 2
+    angles = rng.uniform(-0.6, 0.6, (1, 4, 2)) * np.ones((2, 1, 1))
+    if on_axis:
+        angles[:, : link + 1] = 0.0
+    feeds = (4 - link) * LENGTH + np.array([-rng.uniform(0.1, 2.0), rng.uniform(0.1, 2.0)])
+    motion = moved(workspace, feeds, angles)
+    scene = Scene(motion=motion, workspace=workspace, radius=0.0)
+    moves = scene.moves(np.zeros(1, dtype=int), np.array([link]), np.array([(0.0, 1.0)]))
+    assert not moves.even[0]
+    times = np.linspace(0.0, 1.0, 101)
+    joints, arc = scene.ends(np.zeros(101, dtype=int), np.full(101, link), times)
+    seen = scene.in_workspace(joints, arc)
+    ends = np.stack([moves.before[0], moves.after[0]])
+    for side in (0, 1):
+        way = ends[1, side] - ends[0, side]
+        share = np.clip((seen[:, side] - ends[0, side]) @ way / (way @ way), 0.0, 1.0)
+        off = np.linalg.norm(seen[:, side] - ends[0, side] - share[:, None] * way, axis=1)
+        assert (off <= moves.astray + 1e-12).all()
+    if on_axis:
+        assert moves.astray < 1e-9
+    assert moves.ways[0] >= np.linalg.norm(ends[1] - ends[0], axis=1).max()
+
+
 @pytest.mark.parametrize("depth", [-0.5, 0.5, 0.8, 1.2, 3.0, 30.0])
 @pytest.mark.parametrize("radius", [0.0, 0.4])
 def test_a_corner_cut_between_poses_is_refused_beyond_the_tolerance_only(depth, radius):
@@ -646,7 +674,7 @@ def test_each_link_has_the_distance_to_the_nearest_of_all_boxes(seed):
     bends = rng.uniform(-1.0, 1.0, (8, 4, 2)) * (feeds >= 40.0)[:, None, None]
     motion = moved(workspace, feeds, bends)
     found = signed_distances(motion.joints, workspace, motion.base_pose, 0.1)
-    behind = motion.joints[..., 0] < 0.0
+    behind = feeds[:, None] < LENGTH * np.arange(4, -1, -1)
     joints = np.where(behind[..., None], 0.0, motion.joints)
     for pose, link in np.ndindex(found.shape):
         start, end = joints[pose, link], joints[pose, link + 1]
