@@ -128,11 +128,11 @@ class Scene:
 
     @cached_property
     def third(self) -> FloatArray:
-        """Bound on the third derivative of each joint's place after each pose, shape (n_steps, n_links + 1)."""
+        """Bounds on the third derivatives of places after each pose, shape (n_steps, n_links + 1)."""
         return self.length * third_derivatives(self.motion.joint_angles)
 
     def steps(self, first: int, last: int) -> Moves:
-        """Return the moves after the poses from `first` to before `last`: links first to last, pose by pose."""
+        """Return the moves of all links after the poses from `first` to before `last`, pose by pose."""
         n_links = self.motion.n_links
         step, link = np.divmod(np.arange((last - first) * n_links), n_links)
         return self.moves(first + step, link, np.tile((0.0, 1.0), (len(step), 1)))
