@@ -7,12 +7,8 @@ that is not clean. `--json` prints one JSON object instead of tables.
 from __future__ import annotations
 
 import dataclasses
-import json
-import math
-import os
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,6 +19,24 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.maze import MAZES, Maze
 from planners import longest, tables
 from planners.cli_bench import add_studies
+from planners.cli_spatial import spatial_app
+from planners.cli_tools import (
+    BAD_INPUT,
+    INTERRUPTED,
+    NOT_CLEAN,
+    PICTURES,
+    JsonOption,
+    LimitOption,
+    RadiusOption,
+    check_folder,
+    check_output,
+    lengths_in,
+    name_of,
+    one_bar,
+    print_outcome,
+    progress_bars,
+    radians,
+)
 from planners.length_trials import motion_path
 from planners.planning import PLANNERS, TIME_BUDGET, plan
 from planners.problem import Motion, PlanningResult, Progress
@@ -31,10 +45,6 @@ from planners.rl.shipped import POLICIES, policy_path
 from planners.validation import validate
 
 __all__ = ["app", "main"]
-
-BAD_INPUT = 2
-NOT_CLEAN = 3
-INTERRUPTED = 130
 
 app = typer.Typer(
     name="hrsnake",
@@ -45,6 +55,7 @@ app = typer.Typer(
 bench_app = typer.Typer(help="Measure, and print tables to paste.")
 app.add_typer(bench_app, name="bench")
 add_studies(bench_app)
+app.add_typer(spatial_app, name="spatial")
 
 # Some versions of typer carry their own copy of click: its base of all usage errors is found by name.
 UsageError: type[Exception] = next(
@@ -55,12 +66,7 @@ MazeArgument = Annotated[
     str, typer.Argument(metavar="MAZE", help=f"A .geojson file, or one of: {', '.join(MAZES)}.")
 ]
 MotionArgument = Annotated[Path, typer.Argument(metavar="MOTION", help="A motion (.npz).")]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")]
-RadiusOption = Annotated[float, typer.Option("--link-radius", help="Radius of the links, in maze units.")]
-LimitOption = Annotated[float | None, typer.Option("--joint-limit", help="Largest joint angle, in degrees.")]
 PlannerOption = Annotated[str, typer.Option("--planner", help=f"auto, {', '.join(PLANNERS)}.")]
-
-PICTURES = (".png", ".svg", ".pdf")
 
 
 @app.callback(invoke_without_command=True)
@@ -91,25 +97,25 @@ def plan_command(
     as_json: JsonOption = False,
 ) -> None:
     """Plan a motion from the feeder to the goal, and check it exactly."""
-    _check_output(out, (".npz",))
-    _check_output(picture, PICTURES)
+    check_output(out, (".npz",))
+    check_output(picture, PICTURES)
     world, arm = Maze.load(maze), _arm(link_length, links, link_radius, joint_limit)
     start = None if warm_start is None else Motion.load(warm_start)
-    with _progress(as_json) as progress:
+    with progress_bars(as_json) as progress:
         result = plan(world, arm, planner, time_budget=time_budget, warm_start=start, progress=progress)
     if result.motion is not None and out is not None:
         result.motion.save(out)
     if picture is not None:
         _draw_result(world, arm, result, picture)
-    _print(
+    print_outcome(
         as_json,
         {
             **result.to_dict(),
             "validation": _report_dict(result),
-            "out": _name(out, result.motion is not None),
-            "picture": _name(picture),
+            "out": name_of(out, result.motion is not None),
+            "picture": name_of(picture),
         },
-        lambda: tables.show_plan(world, arm, result, out, picture),
+        lambda: tables.show_plan(world, arm, result, [out], picture),
     )
     if not result.solved:
         raise typer.Exit(NOT_CLEAN)
@@ -141,24 +147,24 @@ def longest_command(
     as_json: JsonOption = False,
 ) -> None:
     """Find the longest link that reaches the goal, and what arms with shorter links need. Ctrl-C: so far."""
-    _check_output(out)
-    _check_output(plot, PICTURES)
-    _check_output(state, (".json",))
-    world, limit = Maze.load(maze), _radians(joint_limit)
-    with _one_bar(as_json) as progress:
+    check_output(out)
+    check_output(plot, PICTURES)
+    check_output(state, (".json",))
+    world, limit = Maze.load(maze), radians(joint_limit)
+    with one_bar(as_json) as progress:
         result = longest.longest_link(
             world,
             planner,
             link_radius=link_radius,
             joint_limit=limit,
             accuracy=accuracy,
-            lengths=_lengths(lengths),
+            lengths=lengths_in(lengths),
             time_budget=time_budget,
             state=state,
             progress=progress,
         )
     files = [*_write_longest(world, result, out, plot), *_state_files(state)]
-    _print(
+    print_outcome(
         as_json,
         {**result.to_dict(), "files": [str(path) for path in files]},
         lambda: tables.show_longest(world, result, files),
@@ -180,9 +186,11 @@ def validate_command(
     """Check a motion exactly: lengths, feeder, clearance at and between poses, crossings, start and goal."""
     world, moved = Maze.load(maze), Motion.load(motion)
     arm = _arm(moved.link_length, moved.n_links, link_radius, joint_limit)
-    with _progress(as_json) as progress:
+    with progress_bars(as_json) as progress:
         report = validate(moved, world, arm, progress)
-    _print(as_json, tables.validation_dict(report), lambda: tables.show_validation(world, moved, report))
+    print_outcome(
+        as_json, tables.validation_dict(report), lambda: tables.show_validation(world, moved, report)
+    )
     if not report.valid:
         raise typer.Exit(NOT_CLEAN)
 
@@ -203,23 +211,23 @@ def simulate_command(
     from hrsnake_env.replay import save_replay
     from planners.rollout import simulate_motion  # needs the simulator, which other commands do not
 
-    _check_output(out, (".gif",))
-    _check_output(replay, (".html",))
+    check_output(out, (".gif",))
+    check_output(replay, (".html",))
     world, moved = Maze.load(maze), Motion.load(motion)
     arm = _arm(moved.link_length, moved.n_links, link_radius, None)
-    with _progress(as_json) as progress:
+    with progress_bars(as_json) as progress:
         episode = simulate_motion(moved, world, arm, substeps=substeps, progress=progress)
         if out is not None:
             _animate(world, episode, out, progress)
         if replay is not None:
             save_replay([episode.trace(world, link_radius=link_radius)], replay)
-    _print(
+    print_outcome(
         as_json,
         {
             "success": episode.success,
             "verdict": episode.report.to_dict(),
-            "out": _name(out),
-            "replay": _name(replay),
+            "out": name_of(out),
+            "replay": name_of(replay),
         },
         lambda: tables.show_verdict(world, episode, (out, replay)),
     )
@@ -243,9 +251,11 @@ def draw_command(
     if moved is not None:
         moved.check_maze(world)
     picture = Path(f"{world.name}.png") if out is None else out
-    _check_output(picture, PICTURES)
+    check_output(picture, PICTURES)
     summary = draw_geometry(world, moved, picture, link_radius)
-    _print(as_json, {**summary, "out": str(picture)}, lambda: tables.show_geometry(world, summary, picture))
+    print_outcome(
+        as_json, {**summary, "out": str(picture)}, lambda: tables.show_geometry(world, summary, picture)
+    )
 
 
 @app.command("demo")
@@ -258,10 +268,10 @@ def demo_command(
     """Plan, check and simulate the paper's benchmark (Fig. 19) with its links of 430 px."""
     from planners.demo import run_demo
 
-    _check_folder(out)
-    with _progress(as_json) as progress:
+    check_folder(out)
+    with progress_bars(as_json) as progress:
         demo = run_demo(out, progress)
-    _print(as_json, demo.to_dict(), lambda: tables.show_demo(demo))
+    print_outcome(as_json, demo.to_dict(), lambda: tables.show_demo(demo))
     if not demo.clean:
         raise typer.Exit(NOT_CLEAN)
 
@@ -311,9 +321,9 @@ def dataset_command(
     from planners.dataset import dataset_ids, record_dataset
 
     if path is not None:
-        _check_folder(path)
+        check_folder(path)
     env_ids = list(dict.fromkeys(env or ["HyperRedundantMaze-RandomTrain-v0"]))
-    with _progress(as_json) as progress:
+    with progress_bars(as_json) as progress:
         recordings = [
             record_dataset(
                 name,
@@ -333,7 +343,7 @@ def dataset_command(
         for recording in recordings:
             tables.show_rows(f"Data set {recording.dataset_id}", recording.rows())
 
-    _print(as_json, {"datasets": [recording.to_dict() for recording in recordings]}, show)
+    print_outcome(as_json, {"datasets": [recording.to_dict() for recording in recordings]}, show)
     if not all(recording.n_episodes for recording in recordings):
         raise typer.Exit(NOT_CLEAN)
 
@@ -362,7 +372,7 @@ def train_command(
 
     folder = Path(f"{env_id}-{method}-{seed}") if out is None else out
     chosen = None if settings is None else load_settings(method, env_id, file=settings)
-    _check_folder(folder)
+    check_folder(folder)
     run = train(
         method,
         env_id,
@@ -374,7 +384,7 @@ def train_command(
         quiet=as_json,
         settings=chosen,
     )
-    _print(as_json, run.to_dict(), lambda: tables.show_rows(f"{method}: {env_id}", run.rows()))
+    print_outcome(as_json, run.to_dict(), lambda: tables.show_rows(f"{method}: {env_id}", run.rows()))
     if run.stopped == "interrupted":
         raise typer.Exit(INTERRUPTED)
 
@@ -402,7 +412,7 @@ def evaluate_command(
     from planners.rl.evaluate import evaluate_both, replayed, summary
     from planners.rl.network import NetworkPolicy
 
-    _check_output(replay, (".html",))
+    check_output(replay, (".html",))
     acting = NetworkPolicy.load(policy_path(policy))
     facts = evaluate_both(acting, env, episodes=episodes, seed=seed)
     if replay is not None:
@@ -411,9 +421,9 @@ def evaluate_command(
         save_replay(replayed(acting, env, seed=seed), replay)
     figures = {actions: summary(rows) for actions, rows in facts.items()}
     name = acting.origin.env_id if env is None else env
-    _print(
+    print_outcome(
         as_json,
-        {"env_id": name, "summary": figures, "episodes": facts, "replay": _name(replay)},
+        {"env_id": name, "summary": figures, "episodes": facts, "replay": name_of(replay)},
         lambda: tables.show_evaluation(f"{acting.origin.method}: {name}", figures, replay),
     )
 
@@ -476,7 +486,7 @@ def bench_env_command(
     from planners.bench.environment_tables import environment_markdown
     from planners.bench.records import write_results
 
-    _check_output(picture, PICTURES)
+    check_output(picture, PICTURES)
     sizes = environment.QUICK if quick else environment.FULL
     if random_steps is not None:
         sizes = dataclasses.replace(sizes, random_steps=random_steps)
@@ -506,9 +516,9 @@ def bench_report_command(
     """Write tables, pictures and one HTML page of the studies in some folders."""
     from planners.bench.report import write_report
 
-    _check_folder(out)
+    check_folder(out)
     written = [str(path) for path in write_report(folders, out)]
-    _print(as_json, {"written": written}, lambda: print("\n".join(written)))
+    print_outcome(as_json, {"written": written}, lambda: print("\n".join(written)))
 
 
 def main() -> None:
@@ -535,30 +545,14 @@ def _complain(message: str) -> int:
     return BAD_INPUT
 
 
-def _radians(joint_limit: float | None) -> float | None:
-    if joint_limit is not None and not 0.0 < joint_limit <= 180.0:
-        raise InputError(f"Expected --joint-limit over 0 and at most 180 degrees, got {joint_limit:g}.")
-    return None if joint_limit is None else math.radians(joint_limit)
-
-
 def _arm(link_length: float, links: int | None, link_radius: float, joint_limit: float | None) -> ArmSpec:
-    limit = _radians(joint_limit)
+    limit = radians(joint_limit)
     return ArmSpec(link_length=link_length, n_links=links, link_radius=link_radius, joint_limit=limit)
-
-
-def _lengths(text: str) -> list[float]:
-    """Read lengths with commas between them."""
-    try:
-        return [float(part) for part in text.split(",")] if text.strip() else []
-    except ValueError:
-        raise InputError(
-            f"Expected lengths as numbers with commas between them (100,200,300), got '{text}'."
-        ) from None
 
 
 def _parts(text: str, every: tuple[str, ...], out: Path | None) -> tuple[str, ...]:
     """Read which parts of a benchmark are wanted; refuse a file that could not be written first."""
-    _check_output(out, (".json",))
+    check_output(out, (".json",))
     return tuple(part.strip() for part in text.split(",")) if text else every
 
 
@@ -570,7 +564,7 @@ def _publish(
 
     if out is not None:
         write_results(results, out)
-    _print(as_json, results, lambda: print(markdown(results)))
+    print_outcome(as_json, results, lambda: print(markdown(results)))
 
 
 def _write_longest(
@@ -594,76 +588,8 @@ def _state_files(state: Path | None) -> list[Path]:
     return [] if state is None else [path for path in (state, motion_path(state)) if path.exists()]
 
 
-def _print(as_json: bool, data: dict[str, Any], show: Callable[[], None]) -> None:
-    if as_json:
-        print(json.dumps(data))
-    else:
-        show()
-
-
 def _report_dict(result: PlanningResult) -> dict[str, Any] | None:
     return None if result.report is None else tables.validation_dict(result.report)
-
-
-def _name(path: Path | None, written: bool = True) -> str | None:
-    return str(path) if path is not None and written else None
-
-
-def _check_output(path: Path | None, endings: tuple[str, ...] = ()) -> None:
-    """Refuse a file that could not be written, before the work is done."""
-    if path is None:
-        return
-    if endings and path.suffix.lower() not in endings:
-        raise InputError(f"Expected a file name ending in {', '.join(endings)}, got '{path}'.")
-    if not path.parent.is_dir():
-        raise InputError(f"Expected an existing folder for '{path}', but there is no '{path.parent}'.")
-    if path.is_dir():
-        raise InputError(f"Expected a file name to write, but '{path}' is a folder.")
-    if not os.access(path.parent, os.W_OK):
-        raise InputError(f"Expected a folder that can be written, but '{path.parent}' cannot.")
-
-
-def _check_folder(path: Path) -> None:
-    if path.exists() and not path.is_dir():
-        raise InputError(f"Expected a folder, but '{path}' is a file.")
-    if not path.exists() and not path.parent.is_dir():
-        raise InputError(f"Expected an existing folder for '{path}', but there is no '{path.parent}'.")
-    if not os.access(path if path.exists() else path.parent, os.W_OK):
-        raise InputError(f"Expected a folder that can be written, but '{path}' cannot.")
-
-
-@contextmanager
-def _progress(quiet: bool) -> Iterator[Progress]:
-    """Show a bar per stage on stderr, where somebody can see it."""
-    from rich.console import Console
-    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
-    from rich.progress import Progress as Bars
-
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description:<10}"), BarColumn(), TimeElapsedColumn())
-    with Bars(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as bars:
-        tasks: dict[str, Any] = {}
-
-        def tell(stage: str, share: float) -> None:
-            if stage not in tasks:
-                tasks[stage] = bars.add_task(stage, total=1.0)
-            bars.update(tasks[stage], completed=share)
-
-        yield tell
-
-
-@contextmanager
-def _one_bar(quiet: bool) -> Iterator[Progress]:
-    """Show one bar on stderr whose text is the news, where somebody can see it."""
-    from rich.console import Console
-    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
-    from rich.progress import Progress as Bars
-
-    console = Console(stderr=True)
-    columns = (BarColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
-    with Bars(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as bars:
-        task = bars.add_task("", total=1.0)
-        yield lambda news, share: bars.update(task, description=news, completed=share)
 
 
 def _draw_result(maze: Maze, arm: ArmSpec, result: PlanningResult, out: Path) -> None:

@@ -10,10 +10,9 @@ from typing import Annotated
 import typer
 
 from hrsnake_env.errors import InputError
+from planners.cli_tools import INTERRUPTED
 
 __all__ = ["add_studies"]
-
-INTERRUPTED = 130
 
 HELP = {
     "ladder": "Compare all methods on the ladder of tasks, and on random mazes that are held out.",

@@ -149,6 +149,8 @@ class Motion:
             If the file is missing or does not hold a motion.
         """
         values = read_motion_arrays(path)
+        if values["joint_angles"].ndim == 3:
+            raise InputError(f"Expected a motion in the plane in '{path}', got one in space.")
         link_length = float(values.pop("link_length").item())
         return cls(link_length=link_length, **values)
 

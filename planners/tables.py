@@ -17,6 +17,9 @@ from hrsnake_env.maze import Maze
 from planners.length_trials import LengthTrial
 from planners.longest import LongestLink
 from planners.problem import Motion, PlanningResult, ValidationReport
+from planners.spatial.longest import SpatialLongest
+from planners.spatial.problem import SpatialMotion, SpatialResult
+from planners.spatial.workspace import Workspace
 
 if TYPE_CHECKING:
     from planners.demo import Demo
@@ -29,6 +32,7 @@ __all__ = [
     "show_longest",
     "show_plan",
     "show_rows",
+    "show_spatial_longest",
     "show_validation",
     "show_verdict",
     "validation_dict",
@@ -36,6 +40,7 @@ __all__ = [
 ]
 
 Rows = Iterable[tuple[str, str]]
+World = Maze | Workspace
 
 
 def show_rows(title: str, rows: Rows) -> None:
@@ -72,9 +77,9 @@ def timing_rows(timings: dict[str, float], n_poses: int) -> Rows:
         yield f"time: {stage}", f"{seconds(value)}, {value / n_poses * 1e6:.3g} us per pose"
 
 
-def validation_rows(maze: Maze, motion: Motion, report: ValidationReport) -> Rows:
+def validation_rows(world: World, motion: Motion | SpatialMotion, report: ValidationReport) -> Rows:
     """Write the figures of the exact check."""
-    length, units = motion.link_length, maze.units
+    length, units = motion.link_length, world.units
     yield "exact check", "valid" if report.valid else "NOT VALID"
     for fault in report.faults:
         yield f"  {fault.kind}", fault.message
@@ -89,7 +94,7 @@ def validation_rows(maze: Maze, motion: Motion, report: ValidationReport) -> Row
         f"({report.penetration_between / length:.2g} link lengths; {PINCH_TOLERANCE:g} allowed)",
     )
     yield "largest joint step", f"{report.largest_step / length:.3f} link lengths"
-    yield "tip to goal", f"{report.goal_distance:.3g} {units} (radius {maze.goal_radius:g})"
+    yield "tip to goal", f"{report.goal_distance:.3g} {units} (radius {world.goal_radius:g})"
 
 
 def validation_dict(report: ValidationReport) -> dict[str, Any]:
@@ -103,42 +108,47 @@ def validation_dict(report: ValidationReport) -> dict[str, Any]:
     return {"valid": report.valid, **data, "faults": faults}
 
 
-def motion_rows(maze: Maze, motion: Motion) -> Rows:
+def world_row(world: World) -> tuple[str, str]:
+    """Write what the arm moves in."""
+    return "maze" if isinstance(world, Maze) else "workspace", world.name
+
+
+def motion_rows(world: World, motion: Motion | SpatialMotion) -> Rows:
     """Write what a motion is."""
-    yield "maze", maze.name
-    yield "arm", f"{motion.n_links} links of {motion.link_length:g} {maze.units}"
+    yield world_row(world)
+    yield "arm", f"{motion.n_links} links of {motion.link_length:g} {world.units}"
     yield "poses", f"{motion.n_poses}"
 
 
-def plan_rows(maze: Maze, arm: ArmSpec, result: PlanningResult) -> Rows:
+def plan_rows(world: World, arm: ArmSpec, result: PlanningResult | SpatialResult) -> Rows:
     """Write the outcome of planning."""
     yield "status", f"{result.status} (planner: {result.planner})"
     for number, attempt in enumerate(result.attempts):
         yield "" if number else "tried", f"{attempt}, {seconds(attempt.seconds)}"
     if result.motion is None:
-        yield "maze", maze.name
-        yield "link length", f"{arm.link_length:g} {maze.units}"
+        yield world_row(world)
+        yield "link length", f"{arm.link_length:g} {world.units}"
         yield "reason", result.reason
-        yield from failure_rows(maze, result)
+        yield from failure_rows(world, result)
         return
     assert result.report is not None  # a motion is there only if it was validated
-    yield from motion_rows(maze, result.motion)
-    yield from validation_rows(maze, result.motion, result.report)
+    yield from motion_rows(world, result.motion)
+    yield from validation_rows(world, result.motion, result.report)
     yield from timing_rows(dict(result.timings), result.motion.n_poses)
 
 
-def failure_rows(maze: Maze, result: PlanningResult) -> Rows:
+def failure_rows(world: World, result: PlanningResult | SpatialResult) -> Rows:
     """Write where planning ended, what is in the way, and what would pass there."""
-    failure, units = result.failure, maze.units
+    failure, units = result.failure, world.units
     if failure is None:
         return
-    yield "place", f"({failure.place[0]:.1f}, {failure.place[1]:.1f}) {units}"
+    yield "place", f"({', '.join(f'{value:.1f}' for value in failure.place)}) {units}"
     if failure.path_position is not None:
         yield "along the path", f"{failure.path_position:.1f} {units} from the base"
     if failure.link is not None:
         yield "link", "the one at the tip" if failure.link == 0 else f"{failure.link} behind the tip's"
     if failure.wall is not None:
-        yield "in the way", _wall(maze, failure.wall)
+        yield "in the way", _wall(world, failure.wall)
     if failure.depth is not None:
         yield "depth", f"{failure.depth:.4g} {units} in that wall"
     if result.longest_there is not None:
@@ -146,19 +156,25 @@ def failure_rows(maze: Maze, result: PlanningResult) -> Rows:
 
 
 def show_plan(
-    maze: Maze, arm: ArmSpec, result: PlanningResult, out: Path | None, picture: Path | None = None
+    world: World,
+    arm: ArmSpec,
+    result: PlanningResult | SpatialResult,
+    of_motion: Iterable[Path | None],
+    picture: Path | None = None,
 ) -> None:
-    """Print the outcome of planning."""
-    show_rows("Plan", plan_rows(maze, arm, result))
-    if out is not None:
-        print(f"Written: {out}" if result.motion is not None else f"Nothing written to {out}: no motion.")
+    """Print the outcome of planning, and the files: those of a motion, and a picture that is always drawn."""
+    show_rows("Plan", plan_rows(world, arm, result))
+    for file in of_motion:
+        if file is not None:
+            made = result.motion is not None
+            print(f"Written: {file}" if made else f"Nothing written to {file}: no motion.")
     if picture is not None:
         print(f"Written: {picture}")
 
 
-def show_validation(maze: Maze, motion: Motion, report: ValidationReport) -> None:
+def show_validation(world: World, motion: Motion | SpatialMotion, report: ValidationReport) -> None:
     """Print the exact check of a motion."""
-    show_rows("Exact check", [*motion_rows(maze, motion), *validation_rows(maze, motion, report)])
+    show_rows("Exact check", [*motion_rows(world, motion), *validation_rows(world, motion, report)])
 
 
 def verdict_rows(maze: Maze, report: PinchReport) -> Rows:
@@ -195,13 +211,43 @@ def verdict_rows(maze: Maze, report: PinchReport) -> Rows:
     )
 
 
-def _wall(maze: Maze, number: int) -> str:
-    start, end = maze.walls[number].tolist()
-    return f"wall {number} from {_place(start)} to {_place(end)}"
+def _wall(world: World, number: int) -> str:
+    what, ends = ("wall", world.walls) if isinstance(world, Maze) else ("obstacle", world.obstacles)
+    start, end = ends[number].tolist()
+    return f"{what} {number} from {_place(start)} to {_place(end)}"
 
 
 def _place(place: Sequence[float]) -> str:
-    return f"({place[0]:.5g}, {place[1]:.5g})"
+    return f"({', '.join(f'{value:.5g}' for value in place)})"
+
+
+def show_spatial_longest(workspace: Workspace, result: SpatialLongest, files: Iterable[Path]) -> None:
+    """Print the longest link in space, and what was tried."""
+    units = workspace.units
+    rows = [world_row(workspace)]
+    if result.motion is None:
+        rows.append(("longest link", "none was found"))
+    else:
+        rows.append(("longest link", f"{result.length:.5g} {units}"))
+        rows.append(("links", f"{result.motion.n_links}"))
+    if not result.complete:
+        rows.append(("", "stopped: there may be longer ones"))
+    show_rows("Longest link", rows)
+    table = Table(title="What was tried", title_justify="left", box=box.SIMPLE_HEAD)
+    for heading in (f"link, {units}", "links", f"clearance, {units}", "time", "outcome"):
+        table.add_column(heading, justify="left" if heading == "outcome" else "right", no_wrap=True)
+    for trial in result.trials:
+        table.add_row(
+            f"{trial.link_length:.5g}",
+            "" if trial.n_links is None else f"{trial.n_links}",
+            "" if trial.clearance is None else f"{trial.clearance:.3g}",
+            seconds(trial.seconds),
+            str(trial.status),
+            style="bold" if trial.link_length == result.length else None,
+        )
+    Console().print(table)
+    for file in files:
+        print(f"Written: {file}")
 
 
 def show_verdict(maze: Maze, episode: Episode, files: Iterable[Path | None]) -> None:

@@ -522,6 +522,7 @@ def test_another_scene_is_shown_at_the_same_feed_from_the_same_side(opened):
     assert page.evaluate("document.documentElement.dataset.scene") == "thin"
     assert page.pose() == int(np.abs(other.feed - bending().feed[40]).argmin())
     assert page.evaluate("stage.camera.yaw") == yaw
+    assert page.evaluate("stage.kept.path.length") == 0  # nothing is left of the other scene's path
     assert page.evaluate("[byId('path').hidden, byId('least').closest('.if-distances').hidden]") == [
         True,
         True,

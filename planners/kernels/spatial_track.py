@@ -211,7 +211,7 @@ def _far_end(points: FloatArray, i: int, near: int, far: int, squared: float) ->
         half += step * way
         apart += way * way
     root = max(half * half - size * (apart - squared), 0.0)
-    return min(max((np.sqrt(root) - half) / max(size, 1e-300), 0.0), 1.0)
+    return float(min(max((np.sqrt(root) - half) / max(size, 1e-300), 0.0), 1.0))
 
 
 @njit(cache=True)

@@ -20,6 +20,7 @@ from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.path import Path as Outline
+from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike
 
 from hrsnake_env.appearance import COLOURS, FEEDER_SHARE, RGB, link_colours, mixed, rgb
@@ -37,8 +38,8 @@ VIEWS = ((-58.0, 26.0), (-78.0, 62.0))
 
 SOLID, FLOOR, BACK, GRID = "#97a3b4", "#f1f3f6", "#fafbfc", "#e1e4e9"
 INK, SOFT = "#1c2128", "#5b6470"
-GLASS = 0.15
-"""How much a wall hides of what is behind it."""
+GLASS, MANY_WALLS = 0.15, 12
+"""How much a wall hides of what is behind it; if there are more walls than that, each hides less."""
 
 LIGHT = ((0.90, 0.98), (0.82, 0.94), (0.80, 1.08))
 """Brightness of faces along each axis, turned to its low and to its high end."""
@@ -95,6 +96,7 @@ class _View:
         """Draw the room with what is in it."""
         self._draw_backdrop(axes)
         walls = solids(self.workspace)
+        self._glass = GLASS * min(1.0, math.sqrt(MANY_WALLS / max(len(walls), 1)))
         faces = [face for wall in walls for face in wall.faces if face.sign * self.out[face.axis] > 1e-9]
         items = from_behind(faces, [*strokes, *_edges(walls)], self.out)
         runs = itertools.groupby(items, key=lambda item: isinstance(item, Face))
@@ -113,7 +115,7 @@ class _View:
             outlines.append(Outline(np.concatenate(flat), codes))
         shades = [LIGHT[face.axis][int(face.sign > 0)] for face in faces]
         solid = np.array(bytearray.fromhex(SOLID[1:])) / 255.0
-        colours = [(*np.minimum(shade * solid, 1.0), GLASS) for shade in shades]
+        colours = [(*np.minimum(shade * solid, 1.0), self._glass) for shade in shades]
         axes.add_collection(
             PathCollection(outlines, facecolors=colours, edgecolors="none", zorder=zorder), autolim=False
         )
@@ -210,9 +212,13 @@ def _arm_strokes(
     feeder: FloatArray,
     widths: tuple[float, float],
     share: float,
+    lift: float,
     size: float,
 ) -> Iterator[Stroke]:
-    """Yield the links past the base in short pieces, and their joints; `share` below 1 fades them."""
+    """Yield the links past the base in short pieces, and their joints; `share` below 1 fades them.
+
+    Poses may lie on each other: the one with the larger `lift` is seen.
+    """
     heading = (feeder[1] - feeder[0]) / np.linalg.norm(feeder[1] - feeder[0])
     ahead = (joints - feeder[1]) @ heading
     aside = np.linalg.norm(joints - feeder[1] - ahead[:, None] * heading, axis=1)
@@ -225,11 +231,10 @@ def _arm_strokes(
         n_pieces = max(2, math.ceil(float(np.linalg.norm(end - start)) / (0.012 * size)))
         width = widths[0] * (1.25 if colour == rgb("collision") else 1.0)
         for a, b in itertools.pairwise(np.linspace(start, end, n_pieces + 1)):
-            yield Stroke(start=a, end=b, colour=_tint(colour, share), width=width, lift=0.004 * size)
+            yield Stroke(start=a, end=b, colour=_tint(colour, share), width=width, lift=lift)
         for place in (start, end) if share == 1.0 else ():
-            yield Stroke(
-                start=place, end=place + dot, colour=_tint(rgb("joint")), width=widths[1], lift=0.02 * size
-            )
+            above, colour = lift + 0.016 * size, rgb("joint")
+            yield Stroke(start=place, end=place + dot, colour=_tint(colour), width=widths[1], lift=above)
 
 
 def _tint(colour: RGB, share: float = 1.0) -> tuple[float, ...]:
@@ -360,7 +365,7 @@ def _inside(
 ) -> Iterator[Stroke]:
     """Yield what is in the room: feeder, path, the arm in its poses; widths are those of links and joints."""
     size, sleeve = workspace.size, 2.4 * widths[0]
-    yield Stroke(start=feeder[0], end=feeder[1], colour=_tint(rgb("base")), width=sleeve, lift=0.05 * size)
+    yield Stroke(start=feeder[0], end=feeder[1], colour=_tint(rgb("base")), width=sleeve, lift=size)
     if path is not None:
         points = np.asarray(path, dtype=np.float64)
         step = max(1, len(points) // 400)
@@ -374,17 +379,19 @@ def _inside(
         if clear is not None:
             colours = [rgb("collision") if d < 0.0 else c for c, d in zip(colours, clear, strict=True)]
         share = 1.0 if number == len(poses) - 1 else 0.25 + 0.35 * number / max(len(poses) - 1, 1)
+        lift = size * (0.004 + 0.02 * number)
         yield from _arm_strokes(
-            motion.joints[pose], colours, feeder=feeder, widths=widths, share=share, size=size
+            motion.joints[pose], colours, feeder=feeder, widths=widths, share=share, lift=lift, size=size
         )
 
 
 def _mark_ends(axes: Axes, view: _View, workspace: Workspace) -> None:
     goal, base = (tuple(view.flat(place)) for place in (workspace.goal, view.feeder[0]))
     axes.plot(*goal, "o", color=COLOURS["goal"], markersize=6.5, markeredgecolor="white", zorder=8)
-    style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8, "zorder": 9, "weight": "bold"}
+    style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8, "zorder": 10, "weight": "bold"}
+    style["path_effects"] = [withStroke(linewidth=2.2, foreground="white")]
     axes.annotate("goal", goal, (0, -11), ha="center", color=COLOURS["goal"], **style)
-    axes.annotate("feeder", base, (4, 9), ha="center", color=COLOURS["base"], **style)
+    axes.annotate("feeder", base, (2, -13), ha="center", color=COLOURS["base"], **style)
 
 
 def _title(workspace: Workspace, motion: SpatialMotion, distances: FloatArray | None, pose: int) -> str:

@@ -6,22 +6,24 @@ and no more. Its depth in a box is the shortest translation that parts the two, 
 Between poses a bound decides, not samples. Feed and joint angles change linearly there, and all is smooth:
 
 1. `checks.turning` bounds the third derivative x''' of the place of each joint. A parabola through its places
-   at both poses and half way is at most max |x'''| * sqrt(3) / 216 from it, and leaves the chord by as much as
-   half way. So the joint is never farther than e, the sum of the two, from a point that moves evenly along the
-   straight line between its two places, and no point of a link is farther than the larger e of its joints from
-   that of a segment whose ends move so.
+   at both poses and half way is at most max |x'''| * sqrt(3) / 216 from it, and leaves its chord by as much
+   as it does half way. So the joint is never farther than e, the sum of the two, from a point that moves
+   evenly along the straight line between its two places, and no point of a link is farther than the larger e
+   of its joints from that of a segment whose ends move so.
 2. `checks.boxes.moving_gaps` bounds the signed distance g of that segment to a box from below: by planes that
-   stand still, or go along with the segment. So does every single direction; the one in which box and link are
-   farthest apart half way is tried too.
+   stand still, or go along with the segment. So does every single direction; the one in which box and link
+   are farthest apart half way is tried too.
 3. The link is then at most e + radius - g deep in the box.
 
-Where that is not enough the time is halved and both halves are tried, to a limit: e shrinks to a quarter at
-least, and both g to the exact distance. Distances between links are bounded likewise (`checks.crossing`).
+Where that is not enough the time is halved and both halves are tried, to a limit: then e gets smaller by at
+least the square of the time in the end, and g gets to the distance. Distances between links are bounded
+likewise (`checks.crossing`).
 
 What of the arm is in the workspace: joints behind the base are put at the base point, so that a link which
 comes out of the feeder is checked from there on and links wholly in the feeder are not checked. A joint is
-behind the base while the feed is less than the length of arm from it to the tip. The round end of a thick link
-about the base point counts, even the half of it behind the base: `Workspace.check_arm` asks for more room there.
+behind the base while the feed is less than the length of arm from it to the tip. The round end of a thick
+link about the base point counts, even the half of it behind the base: `Workspace.check_arm` asks for at least
+as much room there.
 """
 
 from __future__ import annotations

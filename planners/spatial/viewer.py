@@ -228,6 +228,7 @@ def _packed_scene(scene: Scene, most_poses: int) -> dict[str, Any]:
             "high": room.room_high.tolist(),
             "open": list(room.open_sides),
         },
+        "nWalls": max(len(walls), 1),
         # Eight numbers a rectangle: axis, the way it is turned, two opposite corners.
         "faces": [
             number

@@ -32,6 +32,8 @@ PATIENCE = (3, 6)
 GROUP = 20_000
 """How many links and boxes near them are looked at together."""
 
+NONE = np.zeros(0, dtype=np.int64)
+
 FAULT_SAMPLES = 257
 """Times between two poses at which the depth is looked for when a fault there is described."""
 
@@ -69,23 +71,28 @@ def check_between(scene: Scene, deep: BoolArray, tell: Progress) -> tuple[float,
     already.
     """
     n_steps = scene.motion.n_poses - 1
-    bound, skipped, open_ = 0.0, deep[1:] | deep[:-1], []
+    skipped = deep[1:] | deep[:-1]
+    near = []
     for part in slices(n_steps, scene.motion.n_links * len(scene.boxes)):
-        pieces = _near(scene, part, skipped[part])
-        for first in range(0, len(pieces), GROUP):
-            chosen = np.zeros(len(pieces), dtype=bool)
-            chosen[first : first + GROUP] = True
-            found, left = _swept(scene, pieces[chosen])
-            bound = max(bound, found)
-            open_ += [one for one in left if len(one)]
-        tell("validate", 0.4 + 0.4 * part.stop / n_steps)
+        near.append(_near(scene, part, skipped[part]))
+        tell("validate", 0.4 + 0.2 * part.stop / n_steps)
+    step, link, box = (np.concatenate(values) for values in zip(*near, strict=True)) if near else [NONE] * 3
+    bound, open_ = 0.0, []
+    for first in range(0, len(step), GROUP):
+        group = slice(first, first + GROUP)
+        time = np.tile((0.0, 1.0), (len(step[group]), 1))
+        pieces = _Pieces(step=step[group], link=link[group], box=box[group], time=time)
+        found, left = _swept(scene, pieces)
+        bound = max(bound, found)
+        open_ += [one for one in left if len(one)]
+        tell("validate", 0.6 + 0.2 * min(1.0, (first + GROUP) / len(step)))
     if open_:
         return math.inf, _sweep_fault(scene, open_)
     return math.inf if skipped.any() else bound, None
 
 
-def _near(scene: Scene, part: slice, skipped: BoolArray) -> _Pieces:
-    """Find the boxes that come within reach of each link between poses."""
+def _near(scene: Scene, part: slice, skipped: BoolArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Find boxes that come within reach of links between poses: steps, links and boxes."""
     moves = scene.steps(part.start, part.stop)
     both = np.concatenate([moves.before, moves.after], axis=1)
     gaps = frame_gaps(both.min(axis=1), both.max(axis=1), scene.boxes)
@@ -94,7 +101,7 @@ def _near(scene: Scene, part: slice, skipped: BoolArray) -> _Pieces:
     gaps[~looked_at.ravel()] = np.inf
     row, box = np.nonzero(gaps < (moves.astray + scene.radius + scene.slack)[:, None])
     step, link = np.divmod(row, scene.motion.n_links)
-    return _Pieces(step=part.start + step, link=link, box=box, time=np.tile((0.0, 1.0), (len(row), 1)))
+    return part.start + step, link, box
 
 
 def _swept(scene: Scene, pieces: _Pieces) -> tuple[float, list[_Pieces]]:

@@ -16,7 +16,7 @@ __all__ = ["axis_gaps", "direction_gaps", "frame_gaps", "moving_gaps", "separati
 
 
 def frame_gaps(low: FloatArray, high: FloatArray, boxes: FloatArray) -> FloatArray:
-    """Compute the gaps between bounding boxes and boxes: the largest along x, y or z; negative if they overlap.
+    """Compute the gaps of bounding boxes to boxes: the largest along x, y or z; negative if they overlap.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def axis_gaps(start: FloatArray, end: FloatArray, low: FloatArray, high: FloatAr
     """Compute the gaps between segments and boxes along twelve directions.
 
     They are the normals of the faces of box plus segment, a zonotope: if the two overlap, the largest gap is
-    exactly minus the shortest translation that parts them; if not, it is at most their distance, and positive.
+    exactly minus the shortest translation that parts them; if not, it is positive, at most their distance.
 
     Parameters
     ----------
@@ -173,10 +173,10 @@ def direction_gaps(points: FloatArray, normals: FloatArray, low: FloatArray, hig
 def moving_gaps(before: FloatArray, after: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     """Bound from below the signed distances of segments whose ends move straight and evenly.
 
-    Two kinds of planes are tried. The faces of the box, beyond which all four ends must be. And planes that go
-    along with the segment, and hold one axis too: with m(t) = axis x (end - start), which is linear in time,
-    a corner c of the box is m . (c - start) / |m| in front of the plane. The numerator is quadratic in time,
-    so its extremes are known, and |m| is largest at one of the two times.
+    Two kinds of planes are tried. The faces of the box, beyond which all four ends must be. And planes that
+    go along with the segment, and hold one axis too: with m(t) = axis x (end - start), which is linear in
+    time, a corner c of the box is m . (c - start) / |m| in front of the plane. The numerator is quadratic in
+    time, so its extremes are known, and |m| is largest at one of the two times.
 
     Parameters
     ----------

@@ -128,27 +128,24 @@ class Scene:
 
     @cached_property
     def third(self) -> FloatArray:
-        """Bound on the third derivative of each joint's place after each pose, shape (n_steps, n_links + 1)."""
+        """Bounds on the third derivatives of places after each pose, shape (n_steps, n_links + 1)."""
         return self.length * third_derivatives(self.motion.joint_angles)
 
     def steps(self, first: int, last: int) -> Moves:
-        """Return the moves of all links after the poses from `first` to before `last`, links first to last."""
-        part, after = slice(first, last), slice(first + 1, last + 1)
-        halfway = (self.halfway[0][part], self.halfway[1][part])
-        places = [
-            np.stack([value[:, :-1], value[:, 1:]], axis=2).reshape(-1, 2, *value.shape[2:])
-            for value in (
-                *(self.placed[part], self.placed[after], halfway[0]),
-                *(self.arc[part], self.arc[after], halfway[1]),
-                self.third[part],
-            )
-        ]
-        return self._moves(places[:3], places[3:6], CUBIC * places[6])
+        """Return the moves of all links after the poses from `first` to before `last`, pose by pose."""
+        n_links = self.motion.n_links
+        step, link = np.divmod(np.arange((last - first) * n_links), n_links)
+        return self.moves(first + step, link, np.tile((0.0, 1.0), (len(step), 1)))
 
     def moves(self, step: IntArray, link: IntArray, time: FloatArray) -> Moves:
         """Compute the moves of links, shape (n,), over times after poses, shape (n, 2), in [0, 1]."""
         both = np.stack([link, link + 1], axis=1)
         cubic = CUBIC * self.third[step[:, None], both] * np.ptp(time, axis=1)[:, None] ** 3
+        if (time == (0.0, 1.0)).all():
+            rows, after = step[:, None], step[:, None] + 1
+            places = [self.placed[rows, both], self.placed[after, both], self.halfway[0][rows, both]]
+            arcs = [self.arc[rows, both], self.arc[after, both], self.halfway[1][rows, both]]
+            return self._moves(places, arcs, cubic)
         times = np.stack([time[:, 0], time[:, 1], time.mean(axis=1)])
         found = [self.ends(step, link, moment) for moment in times]
         return self._moves([joints for joints, _ in found], [arc for _, arc in found], cubic)
