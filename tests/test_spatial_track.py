@@ -180,7 +180,11 @@ def curve_at_random(rng, n=150):
     """Return a smooth curve from (1, 0, 0) on, about six units long, first along x."""
     turns = np.cumsum(rng.normal(0.0, 0.06, (n, 2)), axis=0)
     way = np.column_stack(
-        [np.cos(turns[:, 0]) * np.cos(turns[:, 1]), np.sin(turns[:, 0]) * np.cos(turns[:, 1]), np.sin(turns[:, 1])]
+        [
+            np.cos(turns[:, 0]) * np.cos(turns[:, 1]),
+            np.sin(turns[:, 0]) * np.cos(turns[:, 1]),
+            np.sin(turns[:, 1]),
+        ]
     )
     return np.array([1.0, 0.0, 0.0]) + np.concatenate([np.zeros((1, 3)), np.cumsum(way, axis=0) * 6.0 / n])
 
@@ -229,7 +233,9 @@ def chord_depth(points, fixed, boxes):
 def test_a_track_without_slack_that_is_free_stays_as_it_is(seed):
     # Without smoothing nothing but boxes moves it, and even samples stay where they are.
     points, fixed = track_at_random(seed)
-    points[fixed - 1 :] = resampled(points[fixed - 1 :], arclength(points[fixed - 1 :])[-1] / (len(points) - fixed))
+    points[fixed - 1 :] = resampled(
+        points[fixed - 1 :], arclength(points[fixed - 1 :])[-1] / (len(points) - fixed)
+    )
     boxes = boxes_beside(points, np.random.default_rng(seed), least=0.6, size=(0.1, 0.3))
     assert chord_depth(points, fixed, boxes) <= 0.0
     shaped, depth = relaxed(points, fixed, boxes, 0.0, 1)

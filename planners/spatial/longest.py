@@ -25,7 +25,7 @@ STEP = 1.06
 """Ratio of one length of the scan to the one before."""
 
 BEYOND = 3
-"""Lengths of the scan without a plan after which it ends: longer links may pass where shorter ones did not."""
+"""Lengths of the scan without a plan after which it ends; longer links may pass where shorter do not."""
 
 
 @dataclass(frozen=True, kw_only=True)
