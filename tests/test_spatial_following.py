@@ -1,4 +1,4 @@
-"""Laws of path following in space: the paper's figures, link ends on the path, and how far links are from it."""
+"""Laws of path following in space: the paper's figures, joints on the path, and how far links are from it."""
 
 import math
 from functools import cache

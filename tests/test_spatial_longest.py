@@ -34,9 +34,10 @@ def room(**changes):
 
 @pytest.fixture
 def quick(monkeypatch):
-    """Begin with links of a twentieth of the room, and go on in large steps."""
+    """Scan in few and large steps, to the first length without a plan."""
     monkeypatch.setattr(longest, "SHORTEST", 0.05)
     monkeypatch.setattr(longest, "STEP", 1.3)
+    monkeypatch.setattr(longest, "BEYOND", 1)
 
 
 @pytest.fixture
@@ -55,7 +56,7 @@ def asked(monkeypatch):
 @pytest.mark.parametrize("planner", ["follow", "track"])
 def test_the_longest_link_has_a_valid_motion_and_nothing_much_longer_was_found(planner, quick):
     workspace = room()
-    answer = longest_link(workspace, planner, accuracy=0.03)
+    answer = longest_link(workspace, planner, accuracy=0.1)
     assert answer.complete
     assert answer.motion is answer.result.motion and answer.motion.link_length == answer.length
     assert validate(answer.motion, workspace, ArmSpec(link_length=answer.length)).valid
@@ -64,7 +65,7 @@ def test_the_longest_link_has_a_valid_motion_and_nothing_much_longer_was_found(p
     found = [trial for trial in answer.trials if trial.status is PlanningStatus.SOLVED]
     assert found[-1].link_length == answer.length
     beyond = [trial.link_length for trial in answer.trials if trial.link_length > answer.length]
-    assert len(beyond) >= longest.BEYOND and beyond[0] <= answer.length * 1.03 * (1.0 + 1e-9)
+    assert beyond and beyond[0] <= answer.length * 1.1 * (1.0 + 1e-9)
     for trial in answer.trials:
         assert (trial.n_links is not None) == (trial.clearance is not None)
         assert (trial.n_links is not None) == (trial.status is PlanningStatus.SOLVED)
@@ -87,7 +88,7 @@ def test_shaping_the_track_allows_twice_the_link_that_follows():
 
 def test_radius_and_joint_limit_are_those_of_the_arm(quick):
     limit = math.radians(60.0)
-    answer = longest_link(room(), link_radius=3.0, joint_limit=limit, accuracy=0.2)
+    answer = longest_link(room(), link_radius=3.0, joint_limit=limit, accuracy=0.3)
     arm = ArmSpec(link_length=answer.length, link_radius=3.0, joint_limit=limit)
     assert answer.length > 0.0 and validate(answer.motion, room(), arm).valid
 
