@@ -366,18 +366,48 @@ def test_a_joint_limit_straightens_the_track():
     assert largest[0] > 1.2 and largest[1] < 1.02 * limit
 
 
-def test_a_track_that_turns_across_its_chords_is_opened_until_no_joint_jumps():
-    turn = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 40)
-    hairpin = np.column_stack([3.0 + 0.1 * np.cos(turn), 0.1 + 0.1 * np.sin(turn), 0.02 * turn])
-    free = resampled(np.concatenate([[(1.0, 0.0, 0.0)], hairpin, [(-0.5, 1.5, 1.0)]]), 1.0 / PER_LINK)
+def with_axis(corners):
+    """Return a polyline from (1, 0, 0) on as a track: samples, and how many of them are fixed."""
+    free = resampled(np.array(corners), 1.0 / PER_LINK)
     axis = np.linspace(0.0, 1.0, PER_LINK + 1)[:, None] * (1.0, 0.0, 0.0)
-    points, fixed = np.concatenate([axis, free[1:]]), PER_LINK + 1
+    return np.concatenate([axis, free[1:]]), PER_LINK + 1
+
+
+def test_a_corner_at_which_a_joint_would_jump_is_opened_by_shaping():
+    points, fixed = with_axis([(1.0, 0.0, 0.0), (3.0, 0.0, 0.0), (1.5, 2.0, 1.0)])
     base_pose = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
     assert feed(points, 1.0, base_pose).ending == feeding_kernel.JUMP
-    shaped = points
-    for smoothing in (0.1, 0.01):
-        shaped, _ = relaxed(shaped, fixed, FREE, smoothing, 60)
-    assert feed(shaped, 1.0, base_pose).ending == feeding_kernel.DONE
+    for smoothing, iterations in ((0.5, 60), (0.1, 30), (0.02, 30)):
+        points, _ = relaxed(points, fixed, FREE, smoothing, iterations)
+    assert feed(points, 1.0, base_pose).ending == feeding_kernel.DONE
+
+
+def rear_slopes(points, rear, fixed):
+    """Return the cosine between each chord and the track at its rear end, behind the straight stretch."""
+    which = np.flatnonzero(rear >= fixed)
+    k = rear[which].astype(int)
+    ways = points[k + 1] - points[k]
+    chords = points[which] - points[k] - (rear[which] - k)[:, None] * ways
+    return np.einsum("nc,nc->n", ways, chords) / np.linalg.norm(ways, axis=1) / np.linalg.norm(chords, axis=1)
+
+
+def test_the_track_is_turned_towards_chords_that_start_across_it_and_only_there():
+    crank = [(1.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.0, 0.6, 0.3), (3.5, -0.4, -0.2)]
+    straight = [(1.0, 0.0, 0.0), (4.0, 0.0, 0.0)]
+    for corners, across in ((crank, True), (straight, False)):
+        points, fixed = with_axis(corners)
+        n = len(points)
+        near = kernel.Near(np.zeros((n + 7) // 8 + 1, dtype=np.int64), np.empty(0, dtype=np.int64))
+        rear, front, pushes, weights = np.empty(n), np.empty(n), np.zeros((n, 3)), np.zeros(n)
+        kernel.push_chords(points, fixed, 1.0, FREE, near, rear, front, pushes, weights)
+        before = rear_slopes(points, rear, fixed)
+        assert (before.min() < kernel.LEAST_SLOPE) == across
+        kernel._turn_along(points, fixed, 1.0, rear, pushes, weights)
+        assert pushes.any() == across and not pushes[:fixed].any()
+        turned = points + pushes / np.maximum(1.0, weights)[:, None]
+        after = rear_slopes(turned, rear, fixed)
+        low = before < kernel.LEAST_SLOPE
+        assert (after[low].mean() > before[low].mean()) if across else np.array_equal(after, before)
 
 
 @pytest.mark.parametrize("seed", range(4))
