@@ -382,32 +382,23 @@ def test_a_corner_at_which_a_joint_would_jump_is_opened_by_shaping():
     assert feed(points, 1.0, base_pose).ending == feeding_kernel.DONE
 
 
-def rear_slopes(points, rear, fixed):
-    """Return the cosine between each chord and the track at its rear end, behind the straight stretch."""
-    which = np.flatnonzero(rear >= fixed)
-    k = rear[which].astype(int)
-    ways = points[k + 1] - points[k]
-    chords = points[which] - points[k] - (rear[which] - k)[:, None] * ways
-    return np.einsum("nc,nc->n", ways, chords) / np.linalg.norm(ways, axis=1) / np.linalg.norm(chords, axis=1)
-
-
-def test_the_track_is_turned_towards_chords_that_start_across_it_and_only_there():
-    crank = [(1.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.0, 0.6, 0.3), (3.5, -0.4, -0.2)]
-    straight = [(1.0, 0.0, 0.0), (4.0, 0.0, 0.0)]
-    for corners, across in ((crank, True), (straight, False)):
-        points, fixed = with_axis(corners)
-        n = len(points)
-        near = kernel.Near(np.zeros((n + 7) // 8 + 1, dtype=np.int64), np.empty(0, dtype=np.int64))
-        rear, front, pushes, weights = np.empty(n), np.empty(n), np.zeros((n, 3)), np.zeros(n)
-        kernel.push_chords(points, fixed, 1.0, FREE, near, rear, front, pushes, weights)
-        before = rear_slopes(points, rear, fixed)
-        assert (before.min() < kernel.LEAST_SLOPE) == across
-        kernel._turn_along(points, fixed, 1.0, rear, pushes, weights)
-        assert pushes.any() == across and not pushes[:fixed].any()
-        turned = points + pushes / np.maximum(1.0, weights)[:, None]
-        after = rear_slopes(turned, rear, fixed)
-        low = before < kernel.LEAST_SLOPE
-        assert (after[low].mean() > before[low].mean()) if across else np.array_equal(after, before)
+def test_the_track_is_turned_towards_a_chord_that_starts_across_it_and_no_other():
+    points, fixed = with_axis([(1.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.0, 0.8, 0.0), (3.5, 0.0, 0.0)])
+    k = int(np.argmin(np.linalg.norm(points - (2.0, 0.4, 0.0), axis=1)))  # on the riser
+    for i in range(k + 12, len(points) - 1):
+        chord = points[i] - 0.5 * (points[k] + points[k + 1])
+        length = np.linalg.norm(chord)
+        rear, pushes, weights = np.full(len(points), -1.0), np.zeros_like(points), np.zeros(len(points))
+        rear[i] = k + 0.5
+        kernel._turn_along(points, fixed, length, rear, pushes, weights)
+        before = (points[k + 1] - points[k]) @ chord
+        lacks = before < kernel.LEAST_SLOPE * length * np.linalg.norm(points[k + 1] - points[k])
+        assert pushes.any() == lacks == (weights > 0.0).any()
+        if lacks:
+            turned = points + pushes
+            assert (turned[k + 1] - turned[k]) @ chord > before
+            reach = np.flatnonzero(pushes.any(axis=1))
+            assert k - kernel.SPAN < reach.min() and reach.max() < k + 1 + kernel.SPAN
 
 
 @pytest.mark.parametrize("seed", range(4))
