@@ -18,14 +18,14 @@ from planners.spatial.workspace import Workspace
 
 __all__ = ["SpatialLongest", "SpatialTrial", "longest_link"]
 
-SHORTEST = 1.0 / 60.0
+SHORTEST = 1.0 / 40.0
 """First length of the scan, in diagonals of the room."""
 
 STEP = 1.06
 """Ratio of one length of the scan to the one before."""
 
 BEYOND = 3
-"""Lengths of the scan without a plan after which it ends: longer links may pass where shorter ones did not."""
+"""Lengths without a plan after which the scan ends: longer links may pass where shorter ones did not."""
 
 
 @dataclass(frozen=True, kw_only=True)
