@@ -286,6 +286,39 @@ def _straighten(
 
 
 @njit(cache=True)
+def _bend_out(
+    points: FloatArray, fixed: int, length: float, joint_limit: float, front: FloatArray, pushes: FloatArray,
+    weights: FloatArray,
+) -> None:  # fmt: skip
+    """Add pushes against joint angles over a limit on the straight stretch: only the front end can move.
+
+    There a joint angle is also the angle between chord and track, which has a limit of its own.
+    """
+    angle = min(joint_limit, np.arccos(LEAST_SLOPE))
+    allowed, out = length * np.sin(0.5 * angle), np.empty(3)
+    axis = points[fixed - 1] - points[0]
+    axis *= length / np.sqrt((axis**2).sum())
+    for i in range(fixed):
+        k = int(front[i])
+        if front[i] < 0.0 or k + 1 < fixed:
+            continue
+        f, height = front[i] - k, 0.0
+        for c in range(3):
+            ahead = points[k, c] + f * (points[k + 1, c] - points[k, c])
+            out[c] = 0.5 * (points[i, c] + axis[c] - ahead)
+            height += out[c] ** 2
+        height = np.sqrt(height)
+        if height <= allowed:
+            continue
+        share = 2.0 * (height - allowed) / height
+        weights[k] += 1.0 - f
+        weights[k + 1] += f
+        for c in range(3):
+            pushes[k, c] += (1.0 - f) * share * out[c]
+            pushes[k + 1, c] += f * share * out[c]
+
+
+@njit(cache=True)
 def _turn_along(
     points: FloatArray, fixed: int, length: float, rear: FloatArray, pushes: FloatArray, weights: FloatArray
 ) -> None:
@@ -411,6 +444,7 @@ def relax(
         pushes[:], weights[:] = 0.0, 0.0
         worst = push_chords(points, fixed, length, boxes, near, rear, front, pushes, weights)
         _turn_along(points, fixed, length, rear, pushes, weights)
+        _bend_out(points, fixed, length, joint_limit, front, pushes, weights)
         if joint_limit < np.pi:
             _straighten(points, fixed, length, joint_limit, rear, front, pushes, weights)
         for i in range(fixed, n - 1):

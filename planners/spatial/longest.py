@@ -12,7 +12,7 @@ from hrsnake_env.arguments import check_at_least
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from planners.problem import PlanningStatus, Progress
-from planners.spatial.planning import PLANNERS, plan
+from planners.spatial.planning import PLANNERS, check_time_budget, plan
 from planners.spatial.problem import SpatialMotion, SpatialResult
 from planners.spatial.workspace import Workspace
 
@@ -25,7 +25,7 @@ STEP = 1.06
 """Ratio of one length of the scan to the one before."""
 
 BEYOND = 3
-"""Lengths without a plan after which the scan ends: longer links may pass where shorter ones did not."""
+"""Lengths of the scan without a plan after which it ends; longer links may pass where shorter do not."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,13 +136,16 @@ def longest_link(
     Raises
     ------
     InputError
-        If the planner is unknown or a number is out of its range.
+        If the planner is unknown, a number is out of its range, or no arm of this radius fits the feeder.
     """
     if planner not in PLANNERS:
         raise InputError(f"Unknown planner {planner!r}. Available: {', '.join(PLANNERS)}.")
     check_at_least("accuracy", accuracy, 1e-6)
+    check_at_least("link_radius", link_radius, 0.0)
+    check_time_budget(time_budget)
     shortest = max(SHORTEST * workspace.size, 2.5 * link_radius)
     search = _Search(workspace, planner, link_radius, joint_limit, time_budget, progress)
+    workspace.check_arm(search.arm(shortest))
     complete = True
     try:
         search.scan(shortest)
@@ -175,16 +178,21 @@ class _Search:
         self.best: SpatialResult | None = None
         self.length = 0.0
 
+    def arm(self, length: float) -> ArmSpec:
+        """Return an arm with links of a length."""
+        return ArmSpec(link_length=length, link_radius=self.link_radius, joint_limit=self.joint_limit)
+
     def ask(self, length: float) -> bool:
         """Plan with links of a length; tell whether there is a motion."""
         if self.progress is not None:
             self.progress(f"{length:.4g} {self.workspace.units}", min(length / self.workspace.size, 1.0))
         start = time.perf_counter()
-        arm = ArmSpec(link_length=length, link_radius=self.link_radius, joint_limit=self.joint_limit)
+        arm = self.arm(length)
         try:
-            result = plan(self.workspace, arm, self.planner, time_budget=self.time_budget)
+            self.workspace.check_arm(arm)
         except InputError:  # too long for the feeder
             return False
+        result = plan(self.workspace, arm, self.planner, time_budget=self.time_budget)
         self.trials.append(
             SpatialTrial(
                 link_length=length,

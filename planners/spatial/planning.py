@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from hrsnake_env.arguments import is_number
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from planners.problem import Attempt, Failure, PlanningStatus, Progress, ValidationReport
@@ -18,7 +19,7 @@ from planners.spatial.track_planner import plan_track
 from planners.spatial.validation import validate
 from planners.spatial.workspace import Workspace
 
-__all__ = ["PLANNERS", "TIME_BUDGET", "plan"]
+__all__ = ["PLANNERS", "TIME_BUDGET", "check_time_budget", "plan"]
 
 PLANNERS: dict[str, Callable[[SpatialQuery], SpatialCandidate]] = {
     "track": plan_track,
@@ -108,8 +109,7 @@ def plan(
     """
     if planner not in PLANNERS:
         raise InputError(f"Unknown planner {planner!r}. Available: {', '.join(PLANNERS)}.")
-    if not time_budget > 0.0:
-        raise InputError(f"Expected a positive time_budget in seconds, got {time_budget!r}.")
+    check_time_budget(time_budget)
     workspace.check_arm(arm)
     begin = time.perf_counter()
     deadline = begin + time_budget
@@ -130,6 +130,12 @@ def plan(
         timings={**query.timings, "validate": checker.seconds},
         path=None if warm_start is not None or query.path is None else query.path.points,
     )
+
+
+def check_time_budget(time_budget: float) -> None:
+    """Raise InputError if a time budget is no positive number of seconds."""
+    if not is_number(time_budget) or not time_budget > 0.0:
+        raise InputError(f"Expected a positive time_budget in seconds, got {time_budget!r}.")
 
 
 def _warm(result: SpatialResult | None) -> tuple[np.ndarray, float] | None:

@@ -189,16 +189,25 @@ def _dead_end(query: SpatialQuery, track: Track) -> SpatialCandidate:
     """Say which chord is deepest in an obstacle."""
     length, units = query.arm.link_length, query.workspace.units
     obstacles = query.workspace.obstacles
-    tip, rear, wall, depth = kernel.deepest_chord(track.points, track.fixed, length, obstacles)
+    swollen = obstacles + query.arm.link_radius * np.array([[-1.0], [1.0]])
+    tip, rear, wall, depth = kernel.deepest_chord(track.points, track.fixed, length, swollen)
+    links = f"links of {length:g} {units}"
+    if query.arm.joint_limit is not None:
+        links += f" with joints of at most {math.degrees(query.arm.joint_limit):.3g} degrees"
+    if depth <= 0.0:
+        return SpatialCandidate(
+            status=PlanningStatus.DEAD_END,
+            track=track.points,
+            reason=f"No track was found for {links}: it grows ever longer without becoming free.",
+        )
     place = tuple(track.points[tip].tolist())
     low, high = query.workspace.obstacle_in_room(wall)
     return SpatialCandidate(
         status=PlanningStatus.DEAD_END,
         track=track.points,
         reason=(
-            f"No track was found on which links of {length:g} {units} are free: the link that ends at "
-            f"{place_text(place)} is {depth:.3g} {units} deep in the obstacle from {place_text(low)} to "
-            f"{place_text(high)}."
+            f"No track was found on which {links} are free: the link that ends at {place_text(place)} is "
+            f"{depth:.3g} {units} deep in the obstacle from {place_text(low)} to {place_text(high)}."
         ),
         failure=Failure(
             place=place,
