@@ -57,6 +57,8 @@ class Effort:
         In how many steps chords grow.
     fine : int
         Samples per link in the end: their number is doubled up to it.
+    slope : float
+        Smallest cosine between a chord and the track at its rear end.
     strict : float
         Share of the joint limit that is kept.
     """
@@ -65,11 +67,12 @@ class Effort:
     coarse: int
     steps: int
     fine: int = 60
+    slope: float = 0.1
     strict: float = 0.98
 
 
 EFFORTS = (
-    Effort(margin=0.003, coarse=8, steps=20, fine=30),
+    Effort(margin=0.003, coarse=8, steps=20, fine=30, slope=0.2),
     Effort(margin=0.003, coarse=15, steps=40),
     Effort(margin=0.001, coarse=8, steps=20),
     Effort(margin=0.001, coarse=15, steps=40, strict=0.95),
@@ -176,7 +179,9 @@ def _shaped(query: SpatialQuery, effort: Effort) -> tuple[Track, float] | None:
         for smoothing, iterations in stages:
             if query.late:
                 return None
-            depth = kernel.relax(track.points, track.fixed, length, limit, boxes, smoothing, iterations)
+            depth = kernel.relax(
+                track.points, track.fixed, length, limit, effort.slope, boxes, smoothing, iterations
+            )
         curve = track.free
         if float(arclength(curve)[-1]) > longest:
             depth = math.inf
