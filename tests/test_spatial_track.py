@@ -366,6 +366,51 @@ def test_a_joint_limit_straightens_the_track():
     assert largest[0] > 1.2 and largest[1] < 1.02 * limit
 
 
+def test_a_track_that_turns_across_its_chords_is_opened_until_no_joint_jumps():
+    turn = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 40)
+    hairpin = np.column_stack([3.0 + 0.1 * np.cos(turn), 0.1 + 0.1 * np.sin(turn), 0.02 * turn])
+    free = resampled(np.concatenate([[(1.0, 0.0, 0.0)], hairpin, [(-0.5, 1.5, 1.0)]]), 1.0 / PER_LINK)
+    axis = np.linspace(0.0, 1.0, PER_LINK + 1)[:, None] * (1.0, 0.0, 0.0)
+    points, fixed = np.concatenate([axis, free[1:]]), PER_LINK + 1
+    base_pose = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+    assert feed(points, 1.0, base_pose).ending == feeding_kernel.JUMP
+    shaped = points
+    for smoothing in (0.1, 0.01):
+        shaped, _ = relaxed(shaped, fixed, FREE, smoothing, 60)
+    assert feed(shaped, 1.0, base_pose).ending == feeding_kernel.DONE
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_resampled_track_has_even_samples_on_the_polyline_and_keeps_its_ends(seed):
+    rng = np.random.default_rng(seed)
+    points, fixed = track_at_random(seed)
+    points[fixed:-1] += rng.normal(0.0, 0.03, points[fixed:-1].shape)
+    even = points.copy()
+    kernel.resample_free(even, fixed, np.empty_like(points))
+    np.testing.assert_array_equal(even[:fixed], points[:fixed])
+    np.testing.assert_array_equal(even[-1], points[-1])
+    line = points[fixed - 1 :]
+    where = np.linspace(0.0, 1.0, len(line)) * arclength(line)[-1]
+    wanted = np.column_stack([np.interp(where, arclength(line), line[:, c]) for c in range(3)])
+    np.testing.assert_allclose(even[fixed - 1 :], wanted, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_samples_in_a_box_go_to_its_nearest_face_and_others_stay(seed):
+    points, fixed = track_at_random(seed)
+    middle, half = points[fixed + 20], np.array([0.5, 0.3, 0.4])
+    box = np.array([[middle - half + 0.07, middle + half]])
+    moved = points.copy()
+    kernel._leave_boxes(moved, fixed, box)
+    inside = ((points > box[0, 0]) & (points < box[0, 1])).all(axis=1)
+    inside[:fixed] = inside[-1] = False
+    assert inside.any()
+    np.testing.assert_array_equal(moved[~inside], points[~inside])
+    gaps = np.minimum(points - box[0, 0], box[0, 1] - points)[inside].min(axis=1)
+    np.testing.assert_allclose(np.linalg.norm(moved - points, axis=1)[inside], gaps)
+    assert not ((moved > box[0, 0] + ROUNDING) & (moved < box[0, 1] - ROUNDING)).all(axis=1)[inside].any()
+
+
 # Feeding, which is shared with the plane
 
 
