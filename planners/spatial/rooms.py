@@ -97,16 +97,20 @@ def panels_in_a_row(n_panels: int) -> Workspace:
 
 
 def _panel(
-    normal: str, start: float, thickness: float, low: ArrayLike, high: ArrayLike, centre: ArrayLike, half: float
+    normal: str,
+    start: float,
+    thickness: float,
+    low: ArrayLike,
+    high: ArrayLike,
+    centre: ArrayLike,
+    half: float,
 ) -> Panel:
     """Return a panel from `start` on along its normal; across, from `low` to `high`, with a square window."""
     corners = [np.array(corner, dtype=np.float64) for corner in (low, high)]
     window = [np.asarray(centre) - half, np.asarray(centre) + half]
     for ends in (corners, window):
         ends[0][AXES.index(normal)], ends[1][AXES.index(normal)] = start, start + thickness
-    return Panel(
-        normal=normal, low=corners[0], high=corners[1], window_low=window[0], window_high=window[1]
-    )
+    return Panel(normal=normal, low=corners[0], high=corners[1], window_low=window[0], window_high=window[1])
 
 
 def random_room(seed: int, n_boxes: int = 60) -> Workspace:
