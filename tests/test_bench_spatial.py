@@ -55,6 +55,7 @@ def counting_bar(name, total, quiet):
 def results():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(spatial, "bar", counting_bar)
+        patch.setattr(spatial, "PAPER_LENGTHS", (30.0, 90.0))
         patch.setattr(longest, "STEP", 1.8)
         patch.setattr(longest, "BEYOND", 1)
         return run_spatial(TINY, workers=0, quiet=True)
@@ -110,10 +111,9 @@ def test_what_no_planner_has_found_leaves_no_gap_in_the_tables(results):
 
 def test_the_papers_links_follow_or_collide_as_in_its_figures(results):
     rows = {(row["planner"], row["link_length"]): row for row in results["figures"] if not row["longest"]}
-    for length in (8.0, 30.0):
-        row = rows["follow", length]
-        assert row["status"] == "solved" and row["depth"] == row["between"] == 0.0
-        assert row["n_colliding"] == 0 and row["clearance"] > 10.0
+    row = rows["follow", 30.0]
+    assert row["status"] == "solved" and row["depth"] == row["between"] == 0.0
+    assert row["n_colliding"] == 0 and row["clearance"] > 10.0
     row = rows["follow", 90.0]
     assert row["status"] == "not valid" and row["n_colliding"] > 0
     assert row["depth"] == pytest.approx(-row["clearance"]) and row["depth"] > 20.0
