@@ -462,6 +462,22 @@ def bench_paper_command(
     _publish(paper.run_paper(sizes, parts=chosen, quiet=as_json), paper_markdown, out, as_json)
 
 
+@bench_app.command("spatial")
+def bench_spatial_command(
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer rooms, lengths and repeats.")] = False,
+    parts: Annotated[str, typer.Option("--parts", help="Some of the parts, as figures,rooms.")] = "",
+    out: Annotated[Path | None, typer.Option("--out", help="Write all figures (.json).")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure in space: the paper's figures, longest links, random rooms, growth, radius, joint limits."""
+    from planners.bench import spatial
+    from planners.bench.spatial_tables import spatial_markdown
+
+    sizes = spatial.QUICK if quick else spatial.FULL
+    chosen = _parts(parts, spatial.PARTS, out)
+    _publish(spatial.run_spatial(sizes, parts=chosen, quiet=as_json), spatial_markdown, out, as_json)
+
+
 @bench_app.command("env")
 def bench_env_command(
     quick: Annotated[bool, typer.Option("--quick", help="Shorter windows, fewer mazes and steps.")] = False,

@@ -58,7 +58,9 @@ def plan_command(
         float, typer.Option("--time-budget", help="Seconds that planning may take.")
     ] = TIME_BUDGET,
     out: MotionOption = None,
-    picture: Annotated[Path | None, typer.Option("--picture", help="Draw the last pose (.png, .svg, .pdf).")] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", help="Draw the last pose (.png, .svg, .pdf).")
+    ] = None,
     page: PageOption = None,
     as_json: JsonOption = False,
 ) -> None:

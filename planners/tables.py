@@ -212,8 +212,10 @@ def verdict_rows(maze: Maze, report: PinchReport) -> Rows:
 
 
 def _wall(world: World, number: int) -> str:
-    what, ends = ("wall", world.walls) if isinstance(world, Maze) else ("obstacle", world.obstacles)
-    start, end = ends[number].tolist()
+    if isinstance(world, Maze):
+        what, (start, end) = "wall", world.walls[number].tolist()
+    else:
+        what, (start, end) = "obstacle", world.obstacle_in_room(number).tolist()
     return f"{what} {number} from {_place(start)} to {_place(end)}"
 
 

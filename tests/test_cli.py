@@ -109,7 +109,7 @@ def test_the_wall_that_is_in_the_way_is_named_and_drawn(capsys):
     result = PlanningResult(
         status=PlanningStatus.DEAD_END, planner="sweep", failure=failure, longest_there=561.0
     )
-    show_plan(maze, arm, result, None, Path("why.png"))
+    show_plan(maze, arm, result, [None], Path("why.png"))
     words = " ".join(capsys.readouterr().out.split())
     (x0, y0), (x1, y1) = maze.walls[2]
     assert f"in the way wall 2 from ({x0:.5g}, {y0:.5g}) to ({x1:.5g}, {y1:.5g})" in words

@@ -21,9 +21,6 @@ RELAXATION = 0.8
 PARALLEL = 1e-3
 """A chord that rises by less than this share of its length over a face touches it with all of its length."""
 
-LEAST_SLOPE = 0.1
-"""Smallest cosine between a chord and the track at its rear end that is asked for."""
-
 SPAN = 4
 """Samples on each side that turn the track."""
 
@@ -287,14 +284,14 @@ def _straighten(
 
 @njit(cache=True)
 def _bend_out(
-    points: FloatArray, fixed: int, length: float, joint_limit: float, front: FloatArray, pushes: FloatArray,
-    weights: FloatArray,
+    points: FloatArray, fixed: int, length: float, joint_limit: float, least_slope: float, front: FloatArray,
+    pushes: FloatArray, weights: FloatArray,
 ) -> None:  # fmt: skip
     """Add pushes against joint angles over a limit on the straight stretch: only the front end can move.
 
     There a joint angle is also the angle between chord and track, which has a limit of its own.
     """
-    angle = min(joint_limit, np.arccos(LEAST_SLOPE))
+    angle = min(joint_limit, np.arccos(least_slope))
     allowed, out = length * np.sin(0.5 * angle), np.empty(3)
     axis = points[fixed - 1] - points[0]
     axis *= length / np.sqrt((axis**2).sum())
@@ -320,8 +317,9 @@ def _bend_out(
 
 @njit(cache=True)
 def _turn_along(
-    points: FloatArray, fixed: int, length: float, rear: FloatArray, pushes: FloatArray, weights: FloatArray
-) -> None:
+    points: FloatArray, fixed: int, length: float, least_slope: float, rear: FloatArray, pushes: FloatArray,
+    weights: FloatArray,
+) -> None:  # fmt: skip
     """Add pushes that turn the track towards the chord where a chord starts nearly across it.
 
     A joint there would have to run far ahead of the tip, and at a right angle to jump.
@@ -339,7 +337,7 @@ def _turn_along(
             slope += chord[c] * way
             size += way * way
         size = np.sqrt(size)
-        lack = LEAST_SLOPE * size - slope
+        lack = least_slope * size - slope
         if lack <= 0.0:
             continue
         for j in range(SPAN):
@@ -400,8 +398,8 @@ def _leave_boxes(points: FloatArray, fixed: int, boxes: FloatArray) -> None:
 
 @njit(cache=True)
 def relax(
-    points: FloatArray, fixed: int, length: float, joint_limit: float, boxes: FloatArray, smoothing: float,
-    iterations: int,
+    points: FloatArray, fixed: int, length: float, joint_limit: float, least_slope: float, boxes: FloatArray,
+    smoothing: float, iterations: int,
 ) -> float:  # fmt: skip
     """Shape a track until its chords are free, in place; return the largest depth seen in the last iteration.
 
@@ -415,6 +413,8 @@ def relax(
         Of a chord.
     joint_limit : float
         Largest angle between two chords that meet, in rad; pi for none.
+    least_slope : float
+        Smallest cosine between a chord and the track at its rear end: at 0 a joint would jump.
     boxes : array, shape (n_boxes, 2, 3)
         Obstacles, grown by what is to be kept from them.
     smoothing : float
@@ -443,8 +443,8 @@ def relax(
             _look_up(points, boxes, REACH * length, near)
         pushes[:], weights[:] = 0.0, 0.0
         worst = push_chords(points, fixed, length, boxes, near, rear, front, pushes, weights)
-        _turn_along(points, fixed, length, rear, pushes, weights)
-        _bend_out(points, fixed, length, joint_limit, front, pushes, weights)
+        _turn_along(points, fixed, length, least_slope, rear, pushes, weights)
+        _bend_out(points, fixed, length, joint_limit, least_slope, front, pushes, weights)
         if joint_limit < np.pi:
             _straighten(points, fixed, length, joint_limit, rear, front, pushes, weights)
         for i in range(fixed, n - 1):

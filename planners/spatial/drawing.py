@@ -314,7 +314,9 @@ class _Sheet:
         self.scale = (WIDTH - 2.0 * MARGIN) / float(spans[:, 0].max())  # inches per workspace unit
         inner = float(spans[:, 1].max()) * self.scale + 2.0 * MARGIN
         self.height = inner + HEAD + FOOT
-        self.figure = Figure(figsize=(WIDTH * len(views), self.height), dpi=DPI, facecolor="white")
+        size = (WIDTH * len(views), self.height)
+        self.figure = Figure(figsize=size, dpi=DPI, facecolor="white")
+        self.figure.set_layout_engine("none")  # views are placed below, whatever the user's settings
         FigureCanvasAgg(self.figure)
         self.axes = []
         for number, view in enumerate(views):

@@ -18,7 +18,7 @@ from planners.spatial.workspace import Workspace
 
 __all__ = ["SpatialLongest", "SpatialTrial", "longest_link"]
 
-SHORTEST = 1.0 / 60.0
+SHORTEST = 1.0 / 40.0
 """First length of the scan, in diagonals of the room."""
 
 STEP = 1.06

@@ -36,9 +36,6 @@ FINISHING = ((0.3, 60), (0.03, 40), (0.003, 40))
 """Smoothing and number of iterations, while chords grow and then: strong smoothing takes slack and cusps out
 of the track and leaves a residual, which weaker smoothing takes away."""
 
-FINEST = 60
-"""Samples per link in the end: their number is doubled up to it."""
-
 DEEP = 0.01
 """Depth, in link lengths, that is left where no chord is free: the arm is not even fed then."""
 
@@ -58,6 +55,10 @@ class Effort:
         Samples per link while chords grow. The fewer, the faster slack is smoothed out of the track.
     steps : int
         In how many steps chords grow.
+    fine : int
+        Samples per link in the end: their number is doubled up to it.
+    slope : float
+        Smallest cosine between a chord and the track at its rear end.
     strict : float
         Share of the joint limit that is kept.
     """
@@ -65,11 +66,13 @@ class Effort:
     margin: float
     coarse: int
     steps: int
+    fine: int = 60
+    slope: float = 0.1
     strict: float = 0.98
 
 
 EFFORTS = (
-    Effort(margin=0.003, coarse=8, steps=20),
+    Effort(margin=0.003, coarse=8, steps=20, fine=30, slope=0.2),
     Effort(margin=0.003, coarse=15, steps=40),
     Effort(margin=0.001, coarse=8, steps=20),
     Effort(margin=0.001, coarse=15, steps=40, strict=0.95),
@@ -166,8 +169,8 @@ def _shaped(query: SpatialQuery, effort: Effort) -> tuple[Track, float] | None:
         for length in np.geomspace(first, arm.link_length, effort.steps + 1)
     ]
     per_link = effort.coarse
-    while per_link < FINEST:
-        per_link = min(2 * per_link, FINEST)
+    while per_link < effort.fine:
+        per_link = min(2 * per_link, effort.fine)
         plan.append((arm.link_length, per_link, FINISHING))
     depth, longest = 0.0, ASTRAY * float(arclength(curve)[-1])
     for number, (length, per_link, stages) in enumerate(plan):
@@ -176,7 +179,9 @@ def _shaped(query: SpatialQuery, effort: Effort) -> tuple[Track, float] | None:
         for smoothing, iterations in stages:
             if query.late:
                 return None
-            depth = kernel.relax(track.points, track.fixed, length, limit, boxes, smoothing, iterations)
+            depth = kernel.relax(
+                track.points, track.fixed, length, limit, effort.slope, boxes, smoothing, iterations
+            )
         curve = track.free
         if float(arclength(curve)[-1]) > longest:
             depth = math.inf
@@ -201,7 +206,7 @@ def _dead_end(query: SpatialQuery, track: Track) -> SpatialCandidate:
             reason=f"No track was found for {links}: it grows ever longer without becoming free.",
         )
     place = tuple(track.points[tip].tolist())
-    low, high = obstacles[wall]
+    low, high = query.workspace.obstacle_in_room(wall)
     return SpatialCandidate(
         status=PlanningStatus.DEAD_END,
         track=track.points,

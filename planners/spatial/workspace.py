@@ -177,6 +177,10 @@ class Workspace:
         assert self.boxes is not None
         return np.concatenate([*(panel.boxes for panel in self.panels), self.boxes])
 
+    def obstacle_in_room(self, number: int) -> FloatArray:
+        """Return the part of an obstacle in the room, shape (2, 3), for people; of a side, its face."""
+        return np.asarray(np.clip(self.obstacles[number], self.room_low, self.room_high))
+
     @property
     def size(self) -> float:
         """Diagonal of the room."""
