@@ -390,9 +390,9 @@ def test_the_track_is_turned_towards_a_chord_that_starts_across_it_and_no_other(
         length = np.linalg.norm(chord)
         rear, pushes, weights = np.full(len(points), -1.0), np.zeros_like(points), np.zeros(len(points))
         rear[i] = k + 0.5
-        kernel._turn_along(points, fixed, length, rear, pushes, weights)
+        kernel._turn_along(points, fixed, length, 0.1, rear, pushes, weights)
         before = (points[k + 1] - points[k]) @ chord
-        lacks = before < kernel.LEAST_SLOPE * length * np.linalg.norm(points[k + 1] - points[k])
+        lacks = before < 0.1 * length * np.linalg.norm(points[k + 1] - points[k])
         assert pushes.any() == lacks == (weights > 0.0).any()
         if lacks:
             turned = points + pushes
