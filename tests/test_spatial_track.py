@@ -210,7 +210,7 @@ def boxes_beside(points, rng, n=40, least=0.15, size=(0.2, 0.8)):
 
 def relaxed(points, fixed, boxes, smoothing=0.1, iterations=60, limit=math.pi):
     points = points.copy()
-    depth = kernel.relax(points, fixed, 1.0, limit, 0.1, boxes, smoothing, iterations)
+    depth = kernel.relax(points, fixed, 1.0, limit, 0.5, 0.1, boxes, smoothing, iterations)
     return points, depth
 
 

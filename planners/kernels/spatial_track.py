@@ -249,8 +249,8 @@ def push_chords(
 
 @njit(cache=True)
 def _straighten(
-    points: FloatArray, fixed: int, length: float, joint_limit: float, rear: FloatArray, front: FloatArray,
-    pushes: FloatArray, weights: FloatArray,
+    points: FloatArray, fixed: int, length: float, joint_limit: float, outward: float, rear: FloatArray,
+    front: FloatArray, pushes: FloatArray, weights: FloatArray,
 ) -> None:  # fmt: skip
     """Add pushes against joint angles over a limit: the joint inwards, the ends of its links outwards."""
     allowed, out = length * np.sin(0.5 * joint_limit), np.empty(3)
@@ -268,18 +268,19 @@ def _straighten(
         height = np.sqrt(height)
         if height <= allowed:
             continue
-        share = 0.5 * (height - allowed) / height
+        share = (height - allowed) / height
+        inwards, outwards = (1.0 - outward) * share, outward * share
         weights[i] += 1.0
         weights[j] += 1.0 - g
         weights[j + 1] += g
         weights[k] += 1.0 - f
         weights[k + 1] += f
         for c in range(3):
-            pushes[i, c] -= share * out[c]
-            pushes[j, c] += (1.0 - g) * share * out[c]
-            pushes[j + 1, c] += g * share * out[c]
-            pushes[k, c] += (1.0 - f) * share * out[c]
-            pushes[k + 1, c] += f * share * out[c]
+            pushes[i, c] -= inwards * out[c]
+            pushes[j, c] += (1.0 - g) * outwards * out[c]
+            pushes[j + 1, c] += g * outwards * out[c]
+            pushes[k, c] += (1.0 - f) * outwards * out[c]
+            pushes[k + 1, c] += f * outwards * out[c]
 
 
 @njit(cache=True)
@@ -398,8 +399,8 @@ def _leave_boxes(points: FloatArray, fixed: int, boxes: FloatArray) -> None:
 
 @njit(cache=True)
 def relax(
-    points: FloatArray, fixed: int, length: float, joint_limit: float, least_slope: float, boxes: FloatArray,
-    smoothing: float, iterations: int,
+    points: FloatArray, fixed: int, length: float, joint_limit: float, outward: float, least_slope: float,
+    boxes: FloatArray, smoothing: float, iterations: int,
 ) -> float:  # fmt: skip
     """Shape a track until its chords are free, in place; return the largest depth seen in the last iteration.
 
@@ -413,6 +414,9 @@ def relax(
         Of a chord.
     joint_limit : float
         Largest angle between two chords that meet, in rad; pi for none.
+    outward : float
+        Share of what a joint angle has too much that the far ends of its links give, outwards; the rest is the
+        joint's own, inwards.
     least_slope : float
         Smallest cosine between a chord and the track at its rear end: at 0 a joint would jump.
     boxes : array, shape (n_boxes, 2, 3)
@@ -446,7 +450,7 @@ def relax(
         _turn_along(points, fixed, length, least_slope, rear, pushes, weights)
         _bend_out(points, fixed, length, joint_limit, least_slope, front, pushes, weights)
         if joint_limit < np.pi:
-            _straighten(points, fixed, length, joint_limit, rear, front, pushes, weights)
+            _straighten(points, fixed, length, joint_limit, outward, rear, front, pushes, weights)
         for i in range(fixed, n - 1):
             share = RELAXATION / max(1.0, weights[i])
             for c in range(3):

@@ -84,7 +84,8 @@ def descend(workspace: Workspace, potential: Potential) -> FloatArray | None:
         return None
     line = potential.origin + potential.cell * line
     ends = np.array([goal, workspace.goal])
-    ends = ends[[not np.allclose(line[-1], goal), not np.allclose(goal, workspace.goal)]]
+    apart = np.array([np.linalg.norm(line[-1] - goal), np.linalg.norm(goal - workspace.goal)])
+    ends = ends[apart > 1e-9 * potential.cell]
     return np.concatenate([workspace.base[None], start[None], line[1:], ends])
 
 

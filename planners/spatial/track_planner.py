@@ -59,6 +59,8 @@ class Effort:
         Samples per link in the end: their number is doubled up to it.
     slope : float
         Smallest cosine between a chord and the track at its rear end.
+    outward : float
+        Share of what a joint angle has too much that the links' far ends give; see `relax`.
     strict : float
         Share of the joint limit that is kept.
     """
@@ -68,14 +70,15 @@ class Effort:
     steps: int
     fine: int = 60
     slope: float = 0.1
+    outward: float = 0.5
     strict: float = 0.98
 
 
 EFFORTS = (
     Effort(margin=0.003, coarse=8, steps=20, fine=30, slope=0.2),
-    Effort(margin=0.003, coarse=15, steps=40),
+    Effort(margin=0.003, coarse=15, steps=40, outward=0.75),
     Effort(margin=0.001, coarse=8, steps=20),
-    Effort(margin=0.001, coarse=15, steps=40, strict=0.95),
+    Effort(margin=0.001, coarse=15, steps=40, outward=0.75, strict=0.95),
     Effort(margin=0.001, coarse=10, steps=80, strict=0.95),
 )
 """What is tried, one after the other, until the exact checker agrees."""
@@ -180,7 +183,15 @@ def _shaped(query: SpatialQuery, effort: Effort) -> tuple[Track, float] | None:
             if query.late:
                 return None
             depth = kernel.relax(
-                track.points, track.fixed, length, limit, effort.slope, boxes, smoothing, iterations
+                track.points,
+                track.fixed,
+                length,
+                limit,
+                effort.outward,
+                effort.slope,
+                boxes,
+                smoothing,
+                iterations,
             )
         curve = track.free
         if float(arclength(curve)[-1]) > longest:
