@@ -35,6 +35,9 @@ PARTS = ("figures", "rooms", "growth", "radius", "workspaces")
 PAPER_LENGTHS = (8.0, 30.0, 90.0)
 """Link lengths of the paper's Figs. 20 to 22: 182 of 8 and 49 of 30 follow the path, 15 of 90 collide."""
 
+IN_ORDER = (FOLLOW, *(planner for planner in PLANNERS if planner != FOLLOW))
+"""All planners, with the one that others are compared with first."""
+
 LENGTH = 90.0
 """Link length for arms with a radius or a joint limit, in workspace units."""
 
@@ -77,7 +80,7 @@ class SpatialSizes:
 
 
 FULL = SpatialSizes(
-    planners=tuple(PLANNERS),
+    planners=IN_ORDER,
     runs=5,
     accuracy=0.005,
     rooms=20,
@@ -95,7 +98,7 @@ FULL = SpatialSizes(
 """Some twenty minutes on two cores."""
 
 QUICK = SpatialSizes(
-    planners=tuple(PLANNERS),
+    planners=IN_ORDER,
     runs=1,
     accuracy=0.03,
     rooms=1,
