@@ -35,6 +35,9 @@ PARTS = ("figures", "rooms", "growth", "radius", "workspaces")
 PAPER_LENGTHS = (8.0, 30.0, 90.0)
 """Link lengths of the paper's Figs. 20 to 22: 182 of 8 and 49 of 30 follow the path, 15 of 90 collide."""
 
+IN_ORDER = (FOLLOW, *(planner for planner in PLANNERS if planner != FOLLOW))
+"""All planners, with the one that others are compared with first."""
+
 LENGTH = 90.0
 """Link length for arms with a radius or a joint limit, in workspace units."""
 
@@ -77,14 +80,14 @@ class SpatialSizes:
 
 
 FULL = SpatialSizes(
-    planners=tuple(PLANNERS),
+    planners=IN_ORDER,
     runs=5,
     accuracy=0.005,
     rooms=20,
     lengths=(90.0, 45.0, 22.5, 11.25, 5.625),
     copies=(1, 2, 4, 8),
     radii=(0.3, 1.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0),
-    limits=(120.0, 110.0, 100.0),
+    limits=(120.0, 110.0, 100.0, 95.0, 90.0),
     panels=(
         *((gap, window, 20.0) for gap, window in ((40.0, 40.0), (40.0, 60.0), (50.0, 50.0), (50.0, 60.0))),
         *((gap, window, 20.0) for gap, window in ((60.0, 60.0), (60.0, 80.0), (80.0, 80.0))),
@@ -95,7 +98,7 @@ FULL = SpatialSizes(
 """Some twenty minutes on two cores."""
 
 QUICK = SpatialSizes(
-    planners=tuple(PLANNERS),
+    planners=IN_ORDER,
     runs=1,
     accuracy=0.03,
     rooms=1,

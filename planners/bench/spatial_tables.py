@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from planners.bench.markdown import milliseconds, parts_in_markdown, table
+from planners.bench.markdown import parts_in_markdown, table
 from planners.bench.spatial_growth import LENGTH, STAGES
 
 __all__ = ["spatial_markdown"]
@@ -30,17 +30,18 @@ def _figures(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     yield (
         "**figures** (the paper's Figs. 20 to 22, in a workspace of ours): paired-panels, lengths in its "
         f"units, path of {_number(rows[0]['path_length'], '.1f')}. Depth is the shortest translation that "
-        "parts link and obstacle: at poses, and a bound of it between them. Mapping errors: a link's largest "
-        "distance from the path that it spans, and the path's from the link. Time per pose is that of "
-        f"feeding alone; the whole plan is field, path, track, poses and exact check, warm; medians of "
-        f"{rows[0]['runs']} runs."
+        "parts link and obstacle: at poses, and a bound of it between them, where the check gives one. "
+        "Mapping errors: a link's largest distance from the path that it spans, and the path's from the "
+        "link. Track: length of the curve on which the joints run. Time per pose is that of "
+        "feeding alone; the whole plan is field, path, shaping of the track, poses and exact check, warm; "
+        f"medians of {rows[0]['runs']} runs."
     )
     yield ""
     yield from table(
         (
             *("planner", "links", "outcome", "depth", "between", "poses that collide", "clearance"),
-            *("link to path", "path to link", "joint runs on", "largest angle"),
-            *("per pose", "field and path", "track", "poses", "check", "whole"),
+            *("link to path", "path to link", "track", "largest angle"),
+            *("per pose", "field and path", "shaping", "poses", "check", "whole"),
         ),
         [_figure_row(row) for row in rows],
     )
@@ -63,10 +64,10 @@ def _figure_row(row: Mapping[str, Any]) -> tuple[str, ...]:
         _number(row["path_to_link"], ".3g"),
         _number(row["track_length"], ".1f"),
         _degrees(row["largest_angle"]),
-        _micro(row["pose_s"]),
-        milliseconds(sum(field)) if field else "-",
-        *(milliseconds(times[key]) if key in times else "-" for key in ("plan", "poses", "validate")),
-        milliseconds(times["whole"]),
+        _time(row["pose_s"]),
+        _time(sum(field)) if field else "-",
+        *(_time(times[key]) if key in times else "-" for key in ("plan", "poses", "validate")),
+        _time(times["whole"]),
     )
 
 
@@ -158,10 +159,7 @@ def _growth_row(row: Mapping[str, Any]) -> tuple[str, ...]:
         str(row["n_obstacles"]),
         f"{row['n_poses']:,}",
         str(row["attempts"]),
-        *(
-            _micro(row["median_s"][key]) if key == "per pose" else milliseconds(row["median_s"][key])
-            for key in STAGES
-        ),
+        *(_time(row["median_s"][stage]) for stage in STAGES),
     )
 
 
@@ -188,7 +186,7 @@ def _radius(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
                 _number(row["n_links"], "d"),
                 _number(row["clearance"], ".3g"),
                 _degrees(row["largest_angle"]),
-                milliseconds(row["seconds"]),
+                _time(row["seconds"]),
             )
             for row in rows
         ],
@@ -222,8 +220,14 @@ def _number(value: float | None, form: str) -> str:
     return "-" if value is None else format(value, form)
 
 
-def _micro(seconds: float | None) -> str:
-    return "-" if seconds is None else f"{seconds * 1e6:.3g} us"
+def _time(seconds: float | None) -> str:
+    """Write a time in the unit in which it is easiest to read."""
+    if seconds is None:
+        return "-"
+    for unit, size in (("s", 1.0), ("ms", 1e-3)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds * 1e6:.3g} us"
 
 
 def _degrees(angle: float | None) -> str:
