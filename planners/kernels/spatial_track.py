@@ -328,7 +328,7 @@ def _turn_along(
     n = points.shape[0]
     for i in range(fixed, n):
         k = int(rear[i])
-        if k < fixed:
+        if k < 0:
             continue
         size, slope, chord = 0.0, 0.0, np.empty(3)
         for c in range(3):
@@ -340,6 +340,12 @@ def _turn_along(
         size = np.sqrt(size)
         lack = least_slope * size - slope
         if lack <= 0.0:
+            continue
+        if k < fixed:  # the straight stretch cannot turn: its chord's front end goes ahead
+            share = lack * length / size**2
+            weights[i] += 1.0
+            for c in range(3):
+                pushes[i, c] += share * (points[k + 1, c] - points[k, c])
             continue
         for j in range(SPAN):
             share = 0.5 * lack * (j + 0.5) * (1.0 - j / SPAN)
