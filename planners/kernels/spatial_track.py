@@ -384,11 +384,12 @@ def resample_free(points: FloatArray, fixed: int, work: FloatArray) -> None:
 
 
 @njit(cache=True)
-def _leave_boxes(points: FloatArray, fixed: int, boxes: FloatArray) -> None:
+def _leave_boxes(points: FloatArray, fixed: int, boxes: FloatArray, near: Near) -> None:
     """Move samples that are in a box to its nearest face."""
     for i in range(fixed, points.shape[0] - 1):
         for _ in range(2):
-            for m in range(boxes.shape[0]):
+            for place in range(near.first[i // BLOCK], near.first[i // BLOCK + 1]):
+                m = near.members[place]
                 least, axis, to = np.inf, 0, 0.0
                 for c in range(3):
                     below, above = points[i, c] - boxes[m, 0, c], boxes[m, 1, c] - points[i, c]
@@ -461,7 +462,7 @@ def relax(
             share = RELAXATION / max(1.0, weights[i])
             for c in range(3):
                 points[i, c] += share * pushes[i, c]
-        _leave_boxes(points, fixed, boxes)
+        _leave_boxes(points, fixed, boxes, near)
     return worst
 
 
