@@ -287,14 +287,15 @@ def _straighten(
 
 @njit(cache=True)
 def _bend_out(
-    points: FloatArray, fixed: int, length: float, joint_limit: float, front: FloatArray, pushes: FloatArray,
-    weights: FloatArray,
+    points: FloatArray, fixed: int, length: float, joint_limit: float, straight: bool, front: FloatArray,
+    pushes: FloatArray, weights: FloatArray,
 ) -> None:  # fmt: skip
     """Add pushes against joint angles over a limit on the straight stretch: only the front end can move.
 
-    There a joint angle is also the angle between chord and track, which has a limit of its own.
+    There a joint angle is also the angle between chord and track, which has a limit of its own. Where the
+    fixed samples are not straight, that limit alone is kept.
     """
-    angle = min(joint_limit, np.arccos(LEAST_SLOPE))
+    angle = min(joint_limit, np.arccos(LEAST_SLOPE)) if straight else np.arccos(LEAST_SLOPE)
     allowed, out = length * np.sin(0.5 * angle), np.empty(3)
     axis = points[fixed - 1] - points[0]
     axis *= length / np.sqrt((axis**2).sum())
@@ -302,6 +303,9 @@ def _bend_out(
         k = int(front[i])
         if front[i] < 0.0 or k + 1 < fixed:
             continue
+        if not straight:
+            axis = points[i + 1] - points[i] if i + 1 < fixed else points[i] - points[i - 1]
+            axis *= length / np.sqrt((axis**2).sum())
         f, height = front[i] - k, 0.0
         for c in range(3):
             ahead = points[k, c] + f * (points[k + 1, c] - points[k, c])
@@ -401,7 +405,7 @@ def _leave_boxes(points: FloatArray, fixed: int, boxes: FloatArray) -> None:
 @njit(cache=True)
 def relax(
     points: FloatArray, fixed: int, length: float, joint_limit: float, boxes: FloatArray, smoothing: float,
-    iterations: int,
+    iterations: int, straight: bool = True,
 ) -> float:  # fmt: skip
     """Shape a track until its chords are free, in place; return the largest depth seen in the last iteration.
 
@@ -421,10 +425,12 @@ def relax(
         Share of the way to the middle of its neighbours that each sample goes in each iteration.
     iterations : int
         All are done: a track that is free at first is not smooth yet.
+    straight : bool
+        Whether the fixed samples are straight. If not, they begin where the chord of the last one starts.
 
     Notes
     -----
-    The caller guarantees that the fixed samples are straight and a chord or more long.
+    The caller guarantees that the fixed samples are a chord or more long.
     """
     n = points.shape[0]
     work, pushes, weights, worst = np.empty_like(points), np.empty_like(points), np.empty(n), 0.0
@@ -444,7 +450,7 @@ def relax(
         pushes[:], weights[:] = 0.0, 0.0
         worst = push_chords(points, fixed, length, boxes, near, rear, front, pushes, weights)
         _turn_along(points, fixed, length, rear, pushes, weights)
-        _bend_out(points, fixed, length, joint_limit, front, pushes, weights)
+        _bend_out(points, fixed, length, joint_limit, straight, front, pushes, weights)
         if joint_limit < np.pi:
             _straighten(points, fixed, length, joint_limit, rear, front, pushes, weights)
         for i in range(fixed, n - 1):
