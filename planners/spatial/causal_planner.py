@@ -61,10 +61,13 @@ SHORTER = (0.8, 0.85, 0.9, 0.95)
 REMEDIES = ((0.0, SHORTER), (0.25, ()), (0.25, ()), (0.5, ()), (0.5, SHORTER))
 """What is tried, one after the other, where the tip cannot advance: links to withdraw, and shorter chords."""
 
+BEYOND = 0.1
+"""How far the tip must get beyond where it could not advance before all is tried anew, in link lengths."""
+
 CUSP = 0.7
 """Cosine of the largest turn of the track from sample to sample; a cusp makes a joint run back or jump."""
 
-ASTRAY = 4.0
+ASTRAY = 2.5
 """A track that is this many times as long as the path winds about an obstacle which it cannot pass."""
 
 
@@ -110,15 +113,15 @@ def grow_track(query: SpatialQuery, horizon: float = HORIZON) -> Grown:
         free = growth.is_free()
         failed = not free or (growth.has_cusp() and tries < len(REMEDIES))
         if failed and tries < len(REMEDIES):
-            tries += 1
+            tries, furthest = tries + 1, max(furthest, growth.size)
             continue
         if failed or growth.astray:
             return Grown(status=PlanningStatus.DEAD_END, track=growth.track, failure=growth.failure())
         growth.advance()
         if growth.arrives:
             return Grown(status=PlanningStatus.SOLVED, track=growth.track)
-        if growth.size > furthest:
-            furthest, tries = growth.size, 0
+        if growth.size > furthest + BEYOND * PER_LINK:
+            tries = 0
 
 
 class _Growth:
