@@ -1,12 +1,12 @@
 """A joint track in space that is grown from the tip on, knowing the path only some links ahead.
 
 The track planner shapes one curve as a whole. Here the way ahead is seen up to a horizon alone. The track
-behind the tip is fixed, as rear joints must run on it. The stretch from the tip to the horizon is shaped as in
-the track planner, with its far end on the path. Then the tip advances by a part of a link, which fixes that
+behind the tip is fixed, as rear joints must run on it. The stretch up to the horizon is shaped as in the
+track planner, with its far end on the path. Then the tip advances by a part of a link, which fixes that
 much, more of the path comes into sight, and so on. Only what is free and has no cusp is fixed.
 
-Where that fails, the chords in sight are grown once more from shorter ones, and then the tip withdraws by up to
-half a link on its own track: what it sees by then may ask for an earlier turn. The motion that is handed on
+Where that fails, the chords in sight are grown once more from shorter ones, and then the tip withdraws by up
+to half a link on its own track: what it sees by then may ask for an earlier turn. The motion that is handed on
 leaves withdrawals out.
 
 How far one must look: in the paired panels, of lengths 5 % apart, links of 88 pass with a horizon of half a
