@@ -6,7 +6,7 @@ track planner, with its far end on the path. Then the tip advances by a part of 
 much, more of the path comes into sight, and so on. Only what is free and has no cusp is fixed.
 
 Where that fails, the chords in sight are grown once more from shorter ones, and then the tip withdraws by up
-to half a link on its own track: what it sees by then may ask for an earlier turn. The motion that is handed on
+to half a link on its own track: what it sees by then may ask for an earlier turn. The motion handed on
 leaves withdrawals out.
 
 How far one must look: in the paired panels, of lengths 5 % apart, links of 88 pass with a horizon of half a
