@@ -210,7 +210,7 @@ def boxes_beside(points, rng, n=40, least=0.15, size=(0.2, 0.8)):
 
 def relaxed(points, fixed, boxes, smoothing=0.1, iterations=60, limit=math.pi):
     points = points.copy()
-    depth = kernel.relax(points, fixed, 1.0, limit, 0.5, 0.1, boxes, smoothing, iterations)
+    depth = kernel.relax(points, fixed, kernel.Demand(1.0, limit), boxes, smoothing, iterations)
     return points, depth
 
 
@@ -390,7 +390,7 @@ def test_the_track_is_turned_towards_a_chord_that_starts_across_it_and_no_other(
         length = np.linalg.norm(chord)
         rear, pushes, weights = np.full(len(points), -1.0), np.zeros_like(points), np.zeros(len(points))
         rear[i] = k + 0.5
-        kernel._turn_along(points, fixed, length, 0.1, rear, pushes, weights)
+        kernel._turn_along(points, fixed, kernel.Demand(length), rear, pushes, weights)
         before = (points[k + 1] - points[k]) @ chord
         lacks = before < 0.1 * length * np.linalg.norm(points[k + 1] - points[k])
         assert pushes.any() == lacks == (weights > 0.0).any()

@@ -109,6 +109,31 @@ def overlap(
     return least, nx, ny, nz, t
 
 
+class Demand(NamedTuple):
+    """What is asked of a track besides that its chords are free.
+
+    Attributes
+    ----------
+    length : float
+        Of a chord.
+    joint_limit : float
+        Largest angle between two chords that meet, in rad; pi for none.
+    outward : float
+        Share of what a joint angle has too much that the far ends of its links give, outwards; the rest is the
+        joint's own, inwards.
+    slope : float
+        Smallest cosine between a chord and the track at its rear end: at 0 a joint would jump.
+    straight : bool
+        Whether the fixed samples are straight. If not, they begin where the chord of the last one starts.
+    """
+
+    length: float
+    joint_limit: float = np.pi
+    outward: float = 0.5
+    slope: float = 0.1
+    straight: bool = True
+
+
 class Near(NamedTuple):
     """Which boxes are near each block of samples.
 
@@ -249,11 +274,11 @@ def push_chords(
 
 @njit(cache=True)
 def _straighten(
-    points: FloatArray, fixed: int, length: float, joint_limit: float, outward: float, rear: FloatArray,
-    front: FloatArray, pushes: FloatArray, weights: FloatArray,
+    points: FloatArray, fixed: int, demand: Demand, rear: FloatArray, front: FloatArray, pushes: FloatArray,
+    weights: FloatArray,
 ) -> None:  # fmt: skip
     """Add pushes against joint angles over a limit: the joint inwards, the ends of its links outwards."""
-    allowed, out = length * np.sin(0.5 * joint_limit), np.empty(3)
+    allowed, out = demand.length * np.sin(0.5 * demand.joint_limit), np.empty(3)
     for i in range(fixed, points.shape[0]):
         if front[i] < 0.0:
             continue
@@ -269,7 +294,7 @@ def _straighten(
         if height <= allowed:
             continue
         share = (height - allowed) / height
-        inwards, outwards = (1.0 - outward) * share, outward * share
+        inwards, outwards = (1.0 - demand.outward) * share, demand.outward * share
         weights[i] += 1.0
         weights[j] += 1.0 - g
         weights[j + 1] += g
@@ -285,14 +310,16 @@ def _straighten(
 
 @njit(cache=True)
 def _bend_out(
-    points: FloatArray, fixed: int, length: float, joint_limit: float, least_slope: float, front: FloatArray,
-    pushes: FloatArray, weights: FloatArray,
-) -> None:  # fmt: skip
+    points: FloatArray, fixed: int, demand: Demand, front: FloatArray, pushes: FloatArray, weights: FloatArray
+) -> None:
     """Add pushes against joint angles over a limit on the straight stretch: only the front end can move.
 
-    There a joint angle is also the angle between chord and track, which has a limit of its own.
+    There a joint angle is also the angle between chord and track, which has a limit of its own. Where the
+    fixed samples are not straight, that limit alone is kept.
     """
-    angle = min(joint_limit, np.arccos(least_slope))
+    length, angle = demand.length, np.arccos(demand.slope)
+    if demand.straight:
+        angle = min(angle, demand.joint_limit)
     allowed, out = length * np.sin(0.5 * angle), np.empty(3)
     axis = points[fixed - 1] - points[0]
     axis *= length / np.sqrt((axis**2).sum())
@@ -300,6 +327,9 @@ def _bend_out(
         k = int(front[i])
         if front[i] < 0.0 or k + 1 < fixed:
             continue
+        if not demand.straight:
+            axis = points[i + 1] - points[i] if i + 1 < fixed else points[i] - points[i - 1]
+            axis *= length / np.sqrt((axis**2).sum())
         f, height = front[i] - k, 0.0
         for c in range(3):
             ahead = points[k, c] + f * (points[k + 1, c] - points[k, c])
@@ -318,14 +348,13 @@ def _bend_out(
 
 @njit(cache=True)
 def _turn_along(
-    points: FloatArray, fixed: int, length: float, least_slope: float, rear: FloatArray, pushes: FloatArray,
-    weights: FloatArray,
-) -> None:  # fmt: skip
+    points: FloatArray, fixed: int, demand: Demand, rear: FloatArray, pushes: FloatArray, weights: FloatArray
+) -> None:
     """Add pushes that turn the track towards the chord where a chord starts nearly across it.
 
     A joint there would have to run far ahead of the tip, and at a right angle to jump.
     """
-    n = points.shape[0]
+    n, length = points.shape[0], demand.length
     for i in range(fixed, n):
         k = int(rear[i])
         if k < 0:
@@ -338,7 +367,7 @@ def _turn_along(
             slope += chord[c] * way
             size += way * way
         size = np.sqrt(size)
-        lack = least_slope * size - slope
+        lack = demand.slope * size - slope
         if lack <= 0.0:
             continue
         if k < fixed:  # the straight stretch cannot turn: its chord's front end goes ahead
@@ -406,9 +435,8 @@ def _leave_boxes(points: FloatArray, fixed: int, boxes: FloatArray, near: Near) 
 
 @njit(cache=True)
 def relax(
-    points: FloatArray, fixed: int, length: float, joint_limit: float, outward: float, least_slope: float,
-    boxes: FloatArray, smoothing: float, iterations: int,
-) -> float:  # fmt: skip
+    points: FloatArray, fixed: int, demand: Demand, boxes: FloatArray, smoothing: float, iterations: int
+) -> float:
     """Shape a track until its chords are free, in place; return the largest depth seen in the last iteration.
 
     Parameters
@@ -417,15 +445,8 @@ def relax(
         The track; the first `fixed` samples and the last one stay.
     fixed : int
         At least 2.
-    length : float
-        Of a chord.
-    joint_limit : float
-        Largest angle between two chords that meet, in rad; pi for none.
-    outward : float
-        Share of what a joint angle has too much that the far ends of its links give, outwards; the rest is the
-        joint's own, inwards.
-    least_slope : float
-        Smallest cosine between a chord and the track at its rear end: at 0 a joint would jump.
+    demand : Demand
+        What is asked of it.
     boxes : array, shape (n_boxes, 2, 3)
         Obstacles, grown by what is to be kept from them.
     smoothing : float
@@ -435,7 +456,7 @@ def relax(
 
     Notes
     -----
-    The caller guarantees that the fixed samples are straight and a chord or more long.
+    The caller guarantees that the fixed samples are a chord or more long.
     """
     n = points.shape[0]
     work, pushes, weights, worst = np.empty_like(points), np.empty_like(points), np.empty(n), 0.0
@@ -451,13 +472,13 @@ def relax(
                 before = here
         resample_free(points, fixed, work)
         if iteration % REFRESH == 0:
-            _look_up(points, boxes, REACH * length, near)
+            _look_up(points, boxes, REACH * demand.length, near)
         pushes[:], weights[:] = 0.0, 0.0
-        worst = push_chords(points, fixed, length, boxes, near, rear, front, pushes, weights)
-        _turn_along(points, fixed, length, least_slope, rear, pushes, weights)
-        _bend_out(points, fixed, length, joint_limit, least_slope, front, pushes, weights)
-        if joint_limit < np.pi:
-            _straighten(points, fixed, length, joint_limit, outward, rear, front, pushes, weights)
+        worst = push_chords(points, fixed, demand.length, boxes, near, rear, front, pushes, weights)
+        _turn_along(points, fixed, demand, rear, pushes, weights)
+        _bend_out(points, fixed, demand, front, pushes, weights)
+        if demand.joint_limit < np.pi:
+            _straighten(points, fixed, demand, rear, front, pushes, weights)
         for i in range(fixed, n - 1):
             share = RELAXATION / max(1.0, weights[i])
             for c in range(3):

@@ -12,6 +12,7 @@ from hrsnake_env.arguments import is_number
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from planners.problem import Attempt, Failure, PlanningStatus, Progress, ValidationReport
+from planners.spatial.causal_planner import plan_causal
 from planners.spatial.following import plan_following
 from planners.spatial.problem import SpatialCandidate, SpatialMotion, SpatialResult
 from planners.spatial.query import SpatialQuery
@@ -23,6 +24,7 @@ __all__ = ["PLANNERS", "TIME_BUDGET", "check_time_budget", "plan"]
 
 PLANNERS: dict[str, Callable[[SpatialQuery], SpatialCandidate]] = {
     "track": plan_track,
+    "causal": plan_causal,
     "follow": plan_following,
 }
 """All spatial planners by name."""

@@ -12,6 +12,7 @@ among them is what makes the edge of a window act as a corner does in the plane.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
 from collections.abc import Sequence
@@ -25,6 +26,7 @@ from planners.kernels import feeding as feeding_kernel
 from planners.kernels import spatial_track as kernel
 from planners.path import arclength, resampled
 from planners.problem import Failure, PlanningStatus
+from planners.spatial.following import follow_path
 from planners.spatial.problem import SpatialCandidate, SpatialMotion
 from planners.spatial.query import SpatialQuery
 from planners.spatial.workspace import Workspace
@@ -57,10 +59,8 @@ class Effort:
         In how many steps chords grow.
     fine : int
         Samples per link in the end: their number is doubled up to it.
-    slope : float
-        Smallest cosine between a chord and the track at its rear end.
-    outward : float
-        Share of what a joint angle has too much that the links' far ends give; see `relax`.
+    slope, outward : float
+        As in `kernels.spatial_track.Demand`.
     strict : float
         Share of the joint limit that is kept.
     """
@@ -76,12 +76,15 @@ class Effort:
 
 EFFORTS = (
     Effort(margin=0.003, coarse=8, steps=20, fine=30, slope=0.2),
-    Effort(margin=0.003, coarse=15, steps=40, outward=0.75),
+    Effort(margin=0.003, coarse=15, steps=40),
     Effort(margin=0.001, coarse=8, steps=20),
-    Effort(margin=0.001, coarse=15, steps=40, outward=0.75, strict=0.95),
+    Effort(margin=0.001, coarse=15, steps=40, strict=0.95),
     Effort(margin=0.001, coarse=10, steps=80, strict=0.95),
 )
 """What is tried, one after the other, until the exact checker agrees."""
+
+LIMITED = tuple(dataclasses.replace(effort, outward=0.75) for effort in EFFORTS)
+"""What is tried then with arms whose joints have a limit: either way of meeting it finds what the other misses."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -114,7 +117,10 @@ def track_from_curve(workspace: Workspace, curve: FloatArray, length: float, per
 
 
 def plan_track(query: SpatialQuery) -> SpatialCandidate:
-    """Plan by a joint track; if it comes with a motion that the exact checker refuses, all efforts failed."""
+    """Plan by a joint track, or failing that by the path itself.
+
+    If a motion is handed on that the exact checker refuses, everything has failed.
+    """
     if query.warm_start is None and query.path is None:
         return SpatialCandidate(
             status=PlanningStatus.NO_PATH,
@@ -123,7 +129,7 @@ def plan_track(query: SpatialQuery) -> SpatialCandidate:
     best = SpatialCandidate(
         status=PlanningStatus.OUT_OF_TIME, reason="Time was over before a track was shaped."
     )
-    for effort in EFFORTS:
+    for effort in EFFORTS if query.arm.joint_limit is None else EFFORTS + LIMITED:
         candidate = _attempt(query, effort)
         if candidate is None:  # time is over
             break
@@ -131,6 +137,11 @@ def plan_track(query: SpatialQuery) -> SpatialCandidate:
             return candidate
         if best.motion is None:
             best = candidate
+    if query.warm_start is None and query.path is not None and not query.late:
+        # Short links, and long ones in wide rooms, may follow the path where no track was found.
+        motion = follow_path(query.path, query.workspace, query.arm.link_length)
+        if query.check(motion).valid:
+            return SpatialCandidate(status=PlanningStatus.SOLVED, motion=motion, track=query.path.points)
     return best
 
 
@@ -179,20 +190,11 @@ def _shaped(query: SpatialQuery, effort: Effort) -> tuple[Track, float] | None:
     for number, (length, per_link, stages) in enumerate(plan):
         query.tell("plan", number / len(plan))
         track = track_from_curve(workspace, curve, length, per_link)
+        demand = kernel.Demand(length, limit, effort.outward, effort.slope, True)
         for smoothing, iterations in stages:
             if query.late:
                 return None
-            depth = kernel.relax(
-                track.points,
-                track.fixed,
-                length,
-                limit,
-                effort.outward,
-                effort.slope,
-                boxes,
-                smoothing,
-                iterations,
-            )
+            depth = kernel.relax(track.points, track.fixed, demand, boxes, smoothing, iterations)
         curve = track.free
         if float(arclength(curve)[-1]) > longest:
             depth = math.inf
