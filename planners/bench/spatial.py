@@ -16,6 +16,7 @@ from planners.bench.records import run_parts
 from planners.bench.spatial_growth import growth_with_links, growth_with_way
 from planners.bench.spatial_trials import (
     FOLLOW,
+    farthest_with_horizon,
     longest_in_panels,
     longest_in_room,
     longest_row,
@@ -29,7 +30,7 @@ from planners.spatial.rooms import paired_panels, random_room
 
 __all__ = ["FULL", "PARTS", "QUICK", "SpatialSizes", "compared", "rooms_with_a_way", "run_spatial"]
 
-PARTS = ("figures", "rooms", "growth", "radius", "workspaces")
+PARTS = ("figures", "growth", "radius", "horizon", "rooms", "workspaces")
 """What can be measured, in the order in which it is."""
 
 PAPER_LENGTHS = (8.0, 30.0, 90.0)
@@ -64,6 +65,8 @@ class SpatialSizes:
         Of links, in workspace units.
     limits : tuple of float
         Of joints, in degrees.
+    horizons : tuple of float
+        Of the causal planner, in links.
     panels : tuple of (gap, window, thickness)
         Sizes of the paired panels, in workspace units.
     """
@@ -76,6 +79,7 @@ class SpatialSizes:
     copies: tuple[int, ...]
     radii: tuple[float, ...]
     limits: tuple[float, ...]
+    horizons: tuple[float, ...]
     panels: tuple[tuple[float, float, float], ...]
 
 
@@ -87,7 +91,8 @@ FULL = SpatialSizes(
     lengths=(90.0, 45.0, 22.5, 11.25, 5.625),
     copies=(1, 2, 4, 8),
     radii=(0.3, 1.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0),
-    limits=(120.0, 110.0, 100.0, 95.0, 90.0),
+    limits=(98.0, 95.0, 90.0),
+    horizons=(0.5, 1.0, 1.5, 2.0, 3.0),
     panels=(
         *((gap, window, 20.0) for gap, window in ((40.0, 40.0), (40.0, 60.0), (50.0, 50.0), (50.0, 60.0))),
         *((gap, window, 20.0) for gap, window in ((60.0, 60.0), (60.0, 80.0), (80.0, 80.0))),
@@ -95,7 +100,7 @@ FULL = SpatialSizes(
         (50.0, 60.0, 1.0),
     ),
 )
-"""Some twenty minutes on two cores."""
+"""Half an hour on two cores."""
 
 QUICK = SpatialSizes(
     planners=IN_ORDER,
@@ -105,7 +110,8 @@ QUICK = SpatialSizes(
     lengths=(90.0, 45.0, 22.5),
     copies=(1, 2, 4),
     radii=(0.3, 4.0),
-    limits=(110.0,),
+    limits=(90.0,),
+    horizons=(1.0,),
     panels=((60.0, 60.0, 20.0),),
 )
 """Two minutes on two cores."""
@@ -158,6 +164,7 @@ def _total(part: str, sizes: SpatialSizes) -> int:
         "rooms": len(sizes.planners) * sizes.rooms,
         "growth": sizes.runs * (len(sizes.lengths) + len(sizes.copies)),
         "radius": len(_arms(sizes)),
+        "horizon": len(sizes.horizons),
         "workspaces": len(sizes.planners) * len(sizes.panels),
     }[part]
 
@@ -179,6 +186,8 @@ def _measure(part: str, sizes: SpatialSizes, workers: int, tell: Tell) -> Any:
                 rows.append(try_arm(paired_panels(), arm))
                 tell()
             return rows
+        case "horizon":
+            return _in_order(farthest_with_horizon, [(horizon,) for horizon in sizes.horizons], workers, tell)
         case _:
             tasks = [
                 (*panels, planner, sizes.accuracy) for panels in sizes.panels for planner in sizes.planners

@@ -18,9 +18,10 @@ def spatial_markdown(results: Mapping[str, Any]) -> str:
         results,
         {
             "figures": _figures,
-            "rooms": _rooms,
             "growth": _growth,
             "radius": _radius,
+            "horizon": _horizon,
+            "rooms": _rooms,
             "workspaces": _workspaces,
         },
     )
@@ -190,6 +191,18 @@ def _radius(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
             )
             for row in rows
         ],
+    )
+
+
+def _horizon(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    yield (
+        "**horizon**: how much of the path ahead of its tip the planner `causal` sees, and the longest of 21 "
+        "link lengths, 5 % apart, with which it passes the paired panels; how many shorter ones fail."
+    )
+    yield ""
+    yield from table(
+        ("horizon, links", "longest link, units", "shorter that fail"),
+        [(f"{row['horizon']:g}", f"{row['length']:.1f}", str(row["shorter_that_fail"])) for row in rows],
     )
 
 

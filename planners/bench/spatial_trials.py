@@ -13,19 +13,21 @@ from hrsnake_env.arm import ArmSpec, FloatArray
 from planners.feeding import feed
 from planners.kernels.feeding import DONE
 from planners.path import arclength
+from planners.spatial.causal_planner import plan_causal
 from planners.spatial.following import follow_path, mapping_error
 from planners.spatial.longest import longest_link
 from planners.spatial.path import Path, global_path
 from planners.spatial.planning import plan
 from planners.spatial.potential import laplace_potential
 from planners.spatial.problem import SpatialMotion, SpatialResult
-from planners.spatial.query import behind_straight
+from planners.spatial.query import SpatialQuery, behind_straight
 from planners.spatial.rooms import load_workspace, paired_panels
 from planners.spatial.validation import signed_distances, validate
 from planners.spatial.workspace import Workspace
 
 __all__ = [
     "FOLLOW",
+    "farthest_with_horizon",
     "longest_in_panels",
     "longest_in_room",
     "longest_row",
@@ -43,6 +45,13 @@ TOUCH = 1e-9
 
 TIME_BUDGET = 20.0
 """Seconds that a planner may take for one length where the longest is looked for."""
+
+
+HORIZON_LENGTHS = tuple(float(length) for length in np.geomspace(50.0, 134.0, 21))
+"""Link lengths with which horizons are compared, 5 % apart, in workspace units."""
+
+HORIZON_SECONDS = 5.0
+"""Time for each of them."""
 
 
 def warm_up_spatial() -> None:
@@ -221,6 +230,31 @@ def longest_in_panels(
         "window": window,
         "thickness": thickness,
         **longest_row(workspace, planner, accuracy),
+    }
+
+
+def farthest_with_horizon(horizon: float) -> dict[str, Any]:
+    """Find the longest of `HORIZON_LENGTHS` with which the causal planner passes the paired panels."""
+    workspace, start = paired_panels(), time.perf_counter()
+    valid: list[float] = []
+    for length in HORIZON_LENGTHS:
+        arm = ArmSpec(link_length=length)
+        query = SpatialQuery(
+            workspace=workspace,
+            arm=arm,
+            deadline=time.perf_counter() + HORIZON_SECONDS,
+            check=lambda motion: validate(motion, workspace),
+        )
+        motion = plan_causal(query, horizon).motion
+        if motion is not None and validate(motion, workspace).valid:
+            valid.append(length)
+    longest = max(valid, default=0.0)
+    return {
+        "task": [horizon],
+        "horizon": horizon,
+        "length": longest,
+        "shorter_that_fail": sum(length <= longest for length in HORIZON_LENGTHS) - len(valid),
+        "seconds": time.perf_counter() - start,
     }
 
 

@@ -119,8 +119,8 @@ class Demand(NamedTuple):
     joint_limit : float
         Largest angle between two chords that meet, in rad; pi for none.
     outward : float
-        Share of what a joint angle has too much that the far ends of its links give, outwards; the rest is the
-        joint's own, inwards.
+        Share of what a joint angle has too much that the far ends of its links give, outwards; the rest is
+        the joint's own, inwards.
     slope : float
         Smallest cosine between a chord and the track at its rear end: at 0 a joint would jump.
     straight : bool

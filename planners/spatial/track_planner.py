@@ -84,7 +84,7 @@ EFFORTS = (
 """What is tried, one after the other, until the exact checker agrees."""
 
 LIMITED = tuple(dataclasses.replace(effort, outward=0.75) for effort in EFFORTS)
-"""What is tried then with arms whose joints have a limit: either way of meeting it finds what the other misses."""
+"""What is tried then if joints have a limit: either way of meeting it finds what the other misses."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
