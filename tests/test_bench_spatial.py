@@ -81,7 +81,7 @@ def test_a_bar_ends_where_the_work_does(results):
 
 
 def test_a_part_that_is_not_there_is_named():
-    with pytest.raises(InputError, match=r"Unknown part 'colour'\. Available: figures, rooms"):
+    with pytest.raises(InputError, match=r"Unknown part 'colour'\. Available: figures, growth"):
         run_spatial(TINY, parts=("colour",))
 
 

@@ -225,7 +225,12 @@ def test_the_order_of_the_axes_does_not_matter(order, planner):
     plain = solved(two_panels(), planner, link_length=length)
     other = solved(mapped(two_panels(), order), planner, link_length=length)
     assert other.motion.n_links == plain.motion.n_links
-    np.testing.assert_allclose(other.track, plain.track[:, list(order)], atol=1e-6)
+    # The causal planner rounds lengths to samples, so it may have one more or less.
+    mine, theirs = (
+        result.track[np.rint(np.linspace(0.0, 1.0, 200) * (len(result.track) - 1)).astype(int)]
+        for result in (plain, other)
+    )
+    np.testing.assert_allclose(theirs, mine[:, list(order)], atol=1.0 if planner == "causal" else 1e-6)
 
 
 @pytest.mark.parametrize("axis", [1, 2])
@@ -346,7 +351,7 @@ def test_a_motion_that_the_checker_refuses_is_never_handed_out(monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"planner": "magic"}, r"Unknown planner 'magic'\. Available: track, follow\."),
+        ({"planner": "magic"}, r"Unknown planner 'magic'\. Available: track, causal, follow\."),
         ({"time_budget": -1.0}, r"Expected a positive time_budget in seconds, got -1\.0\."),
         ({"time_budget": math.nan}, r"Expected a positive time_budget in seconds, got nan\."),
         ({"time_budget": "1"}, r"Expected a positive time_budget in seconds, got '1'\."),
@@ -393,7 +398,7 @@ def test_a_plan_tells_its_progress_and_where_its_time_went(planner):
     )
     assert all(0.0 <= share <= 1.0 for _, share in told)
     stages = list(dict.fromkeys(stage for stage, _ in told))
-    assert stages == (["path", "plan", "validate"] if planner == "track" else ["path", "validate"])
+    assert stages == (["path", "validate"] if planner == "follow" else ["path", "plan", "validate"])
     assert {"potential", "path", "poses", "validate"} <= set(result.timings)
     (attempt,) = result.attempts
     assert attempt.planner == result.planner == planner and attempt.status is result.status

@@ -21,14 +21,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from hrsnake_env.arm import FloatArray
-from planners.feeding import feed
-from planners.kernels import feeding as feeding_kernel
 from planners.kernels import spatial_track as kernel
 from planners.path import arclength, resampled
 from planners.problem import Failure, PlanningStatus
-from planners.spatial.problem import SpatialCandidate, SpatialMotion
+from planners.spatial.problem import SpatialCandidate
 from planners.spatial.query import SpatialQuery, behind_straight
-from planners.spatial.track_planner import place_text
+from planners.spatial.track_planner import candidate_along, obstacle_text, place_text
 
 __all__ = ["HORIZON", "Grown", "grow_track", "plan_causal"]
 
@@ -130,7 +128,8 @@ class _Growth:
         assert query.path is not None
         workspace, arm = query.workspace, query.arm
         self.length, self.horizon, self.margin = arm.link_length, horizon, MARGIN * arm.link_length
-        self.obstacles, self.boxes = workspace.obstacles, workspace.obstacles.copy()
+        self.boxes = workspace.obstacles.copy()
+        self.swollen = workspace.obstacles + arm.link_radius * np.array([[-1.0], [1.0]])
         self.boxes[:, 0] -= arm.link_radius + self.margin
         self.boxes[:, 1] += arm.link_radius + self.margin
         self.limit = math.pi if arm.joint_limit is None else STRICT * arm.joint_limit
@@ -227,7 +226,7 @@ class _Growth:
     def failure(self) -> Failure:
         """Return the chord that is deepest in an obstacle, of those that end on the piece."""
         points = self.points[: self.fixed + self.piece]
-        tip, rear, wall, depth = kernel.deepest_chord(points, self.fixed, self.length, self.obstacles)
+        tip, rear, wall, depth = kernel.deepest_chord(points, self.fixed, self.length, self.swollen)
         way = self.straight + float(arclength(self.track)[-1])
         return Failure(
             place=tuple(points[tip].tolist()),
@@ -241,10 +240,7 @@ class _Growth:
 def plan_causal(query: SpatialQuery, horizon: float = HORIZON) -> SpatialCandidate:
     """Plan by a joint track that is grown from the tip on; the checker says whether the motion is free."""
     if query.path is None:
-        return SpatialCandidate(
-            status=PlanningStatus.NO_PATH,
-            reason="No path from the base to the goal was found, not even for a ball of the links' radius.",
-        )
+        return query.no_path()
     begin = time.perf_counter()
     grown = grow_track(query, horizon)
     query.timings["plan"] = time.perf_counter() - begin
@@ -252,32 +248,17 @@ def plan_causal(query: SpatialQuery, horizon: float = HORIZON) -> SpatialCandida
         return SpatialCandidate(
             status=grown.status, reason=_reason(query, grown), failure=grown.failure, track=grown.track
         )
-    begin = time.perf_counter()
-    length = query.arm.link_length
-    base_pose = query.workspace.base_pose_for(length)
-    curve = np.concatenate([base_pose[None, :3], grown.track])
-    fed = feed(curve, length, base_pose)
-    query.timings["poses"] = time.perf_counter() - begin
-    if fed.ending != feeding_kernel.DONE:
-        return SpatialCandidate(
-            status=PlanningStatus.DEAD_END,
-            reason=f"With the tip at {place_text(fed.place)} a joint would have to jump.",
-            failure=Failure(place=fed.place, joints=fed.poses[-1]),
-            track=curve,
-        )
-    motion = SpatialMotion.from_joints(fed.poses, length, base_pose)
-    return SpatialCandidate(status=PlanningStatus.SOLVED, motion=motion, track=curve)
+    return candidate_along(query, grown.track)
 
 
 def _reason(query: SpatialQuery, grown: Grown) -> str:
     """Say why a track does not reach the goal."""
     if grown.failure is None:
-        return f"Time was over with the tip at {place_text(grown.track[-1])}."
+        return f"Time was over before a track was shaped; its tip is at {place_text(grown.track[-1])}."
     wall, depth, units = grown.failure.wall, grown.failure.depth, query.workspace.units
     assert wall is not None and depth is not None
-    low, high = query.workspace.obstacles[wall]
     return (
         f"The tip cannot advance beyond {place_text(grown.track[-1])}: the link of "
         f"{query.arm.link_length:g} {units} that ends at {place_text(grown.failure.place)} would be "
-        f"{depth:.3g} {units} deep in the obstacle from {place_text(low)} to {place_text(high)}."
+        f"{depth:.3g} {units} deep in {obstacle_text(query.workspace, wall)}."
     )

@@ -83,9 +83,7 @@ def plan_following(query: SpatialQuery) -> SpatialCandidate:
     """Plan by path following; the checker says whether that is free."""
     path = query.path
     if path is None:
-        return SpatialCandidate(
-            status=PlanningStatus.NO_PATH, reason="No way from the base to the goal was found for a point."
-        )
+        return query.no_path()
     begin = time.perf_counter()
     motion = follow_path(path, query.workspace, query.arm.link_length)
     query.timings["poses"] = time.perf_counter() - begin

@@ -10,10 +10,10 @@ from functools import cached_property
 import numpy as np
 
 from hrsnake_env.arm import ArmSpec, FloatArray
-from planners.problem import Progress, ValidationReport
+from planners.problem import PlanningStatus, Progress, ValidationReport
 from planners.spatial.path import Path, global_path
 from planners.spatial.potential import laplace_potential
-from planners.spatial.problem import SpatialMotion
+from planners.spatial.problem import SpatialCandidate, SpatialMotion
 from planners.spatial.workspace import Workspace
 
 __all__ = ["SpatialQuery", "behind_straight"]
@@ -71,6 +71,14 @@ class SpatialQuery:
         self.timings |= {"potential": middle - start, "path": time.perf_counter() - middle}
         self.tell("path", 1.0)
         return path
+
+    def no_path(self) -> SpatialCandidate:
+        """Return the answer of a planner without a path."""
+        what = "a point" if self.arm.link_radius == 0.0 else "a ball of the links' radius"
+        return SpatialCandidate(
+            status=PlanningStatus.NO_PATH,
+            reason=f"No path from the base to the goal was found, not even for {what}.",
+        )
 
     @property
     def start(self) -> tuple[FloatArray, float]:

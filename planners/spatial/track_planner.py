@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hrsnake_env.arm import FloatArray
-from planners.feeding import Feeding, feed
+from planners.feeding import feed
 from planners.kernels import feeding as feeding_kernel
 from planners.kernels import spatial_track as kernel
 from planners.path import arclength, resampled
@@ -31,7 +31,14 @@ from planners.spatial.problem import SpatialCandidate, SpatialMotion
 from planners.spatial.query import SpatialQuery
 from planners.spatial.workspace import Workspace
 
-__all__ = ["Track", "plan_track", "track_from_curve"]
+__all__ = [
+    "Track",
+    "candidate_along",
+    "obstacle_text",
+    "place_text",
+    "plan_track",
+    "track_from_curve",
+]
 
 GROWING = ((0.5, 60), (0.1, 30), (0.02, 30))
 FINISHING = ((0.3, 60), (0.03, 40), (0.003, 40))
@@ -122,10 +129,7 @@ def plan_track(query: SpatialQuery) -> SpatialCandidate:
     If a motion is handed on that the exact checker refuses, everything has failed.
     """
     if query.warm_start is None and query.path is None:
-        return SpatialCandidate(
-            status=PlanningStatus.NO_PATH,
-            reason="No path from the base to the goal was found, not even for a ball of the links' radius.",
-        )
+        return query.no_path()
     best = SpatialCandidate(
         status=PlanningStatus.OUT_OF_TIME, reason="Time was over before a track was shaped."
     )
@@ -154,20 +158,33 @@ def _attempt(query: SpatialQuery, effort: Effort) -> SpatialCandidate | None:
     if shaped is None:
         return None
     track, depth = shaped
-    workspace, arm = query.workspace, query.arm
-    if depth > DEEP * arm.link_length:
+    if depth > DEEP * query.arm.link_length:
         return _dead_end(query, track)
+    return candidate_along(query, track.free)
+
+
+def candidate_along(query: SpatialQuery, curve: FloatArray) -> SpatialCandidate:
+    """Feed the arm along a track, shape (n, 3), from the straight stretch on; or say where a joint jumps."""
     begin = time.perf_counter()
-    base_pose = workspace.base_pose_for(arm.link_length)
-    curve = np.concatenate([base_pose[None, :3], track.free])
-    fed = feed(curve, arm.link_length, base_pose)
+    length = query.arm.link_length
+    base_pose = query.workspace.base_pose_for(length)
+    curve = np.concatenate([base_pose[None, :3], curve])
+    fed = feed(curve, length, base_pose)
     motion = None
     if fed.ending == feeding_kernel.DONE:
-        motion = SpatialMotion.from_joints(fed.poses, arm.link_length, base_pose)
+        motion = SpatialMotion.from_joints(fed.poses, length, base_pose)
     query.timings["poses"] = query.timings.get("poses", 0.0) + time.perf_counter() - begin
-    if motion is None:
-        return _jumps(query, fed)
-    return SpatialCandidate(status=PlanningStatus.SOLVED, motion=motion, track=curve)
+    if motion is not None:
+        return SpatialCandidate(status=PlanningStatus.SOLVED, motion=motion, track=curve)
+    return SpatialCandidate(
+        status=PlanningStatus.DEAD_END,
+        track=curve,
+        reason=(
+            f"With the tip at {place_text(fed.place)} a joint would have to jump: the track turns across the "
+            f"link of {length:g} {query.workspace.units} that starts there."
+        ),
+        failure=Failure(place=fed.place, joints=fed.poses[-1]),
+    )
 
 
 def _shaped(query: SpatialQuery, effort: Effort) -> tuple[Track, float] | None:
@@ -219,13 +236,12 @@ def _dead_end(query: SpatialQuery, track: Track) -> SpatialCandidate:
             reason=f"No track was found for {links}: it grows ever longer without becoming free.",
         )
     place = tuple(track.points[tip].tolist())
-    low, high = query.workspace.obstacle_in_room(wall)
     return SpatialCandidate(
         status=PlanningStatus.DEAD_END,
         track=track.points,
         reason=(
             f"No track was found on which {links} are free: the link that ends at {place_text(place)} is "
-            f"{depth:.3g} {units} deep in the obstacle from {place_text(low)} to {place_text(high)}."
+            f"{depth:.3g} {units} deep in {obstacle_text(query.workspace, wall)}."
         ),
         failure=Failure(
             place=place,
@@ -238,16 +254,10 @@ def _dead_end(query: SpatialQuery, track: Track) -> SpatialCandidate:
     )
 
 
-def _jumps(query: SpatialQuery, fed: Feeding) -> SpatialCandidate:
-    """Say where a joint would have to jump."""
-    return SpatialCandidate(
-        status=PlanningStatus.DEAD_END,
-        reason=(
-            f"With the tip at {place_text(fed.place)} a joint would have to jump: the track turns across the "
-            f"link of {query.arm.link_length:g} {query.workspace.units} that starts there."
-        ),
-        failure=Failure(place=fed.place, joints=fed.poses[-1]),
-    )
+def obstacle_text(workspace: Workspace, number: int) -> str:
+    """Write which obstacle is meant."""
+    low, high = workspace.obstacle_in_room(number)
+    return f"the obstacle from {place_text(low)} to {place_text(high)}"
 
 
 def place_text(place: Sequence[float] | FloatArray) -> str:
