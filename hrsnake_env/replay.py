@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import base64
-import html
 import importlib.resources
-import json
 import math
 import os
-import re
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,6 +20,7 @@ from hrsnake_env.contacts import PINCH_TOLERANCE, Contact
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
+from hrsnake_env.pages import filled, framed
 
 __all__ = ["QUANTUM", "Trace", "replay_html", "save_replay", "show"]
 
@@ -184,13 +182,8 @@ def replay_html(traces: Sequence[Trace]) -> str:
         "clearanceScale": [FAR, PINCH_TOLERANCE],
         "traces": [_packed_trace(trace) for trace in traces],
     }
-    parts = {
-        "TITLE": html.escape(" | ".join(trace.title for trace in traces)),
-        "PAYLOAD": _json_in_html(payload),
-    }
     template = importlib.resources.files("hrsnake_env").joinpath("replay.html").read_text(encoding="utf-8")
-    # In one go, so that nothing in a title is taken for a place to fill.
-    return re.sub("__(TITLE|PAYLOAD)__", lambda place: parts[place[1]], template)
+    return filled(template, " | ".join(trace.title for trace in traces), payload)
 
 
 def show(traces: Sequence[Trace], height: int = 720) -> Any:
@@ -213,22 +206,7 @@ def show(traces: Sequence[Trace], height: int = 720) -> Any:
     InputError
         As `save_replay`; or if IPython is not installed.
     """
-    try:
-        from IPython.display import IFrame
-    except ImportError:
-        raise InputError(
-            "Expected IPython to be installed, to show a replay in a notebook: pip install "
-            "'hrsnake[notebooks]'."
-        ) from None
-    page = html.escape(replay_html(traces))
-    frame: Any = IFrame  # IPython's own functions are only partly typed
-    return frame("about:blank", "100%", height, extras=['sandbox="allow-scripts"', f'srcdoc="{page}"'])
-
-
-def _json_in_html(data: Any) -> str:
-    """Write JSON in which nothing can end the script element that holds it."""
-    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
-    return re.sub("[<>&]", lambda sign: f"\\u{ord(sign[0]):04x}", text)
+    return framed(replay_html(traces), height)
 
 
 def _packed_trace(trace: Trace) -> dict[str, Any]:

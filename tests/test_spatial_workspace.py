@@ -518,8 +518,13 @@ TWICE = "it is inside out or has no thickness"
         ),
         (
             changed("goal.radius", 70),
-            "Expected a goal away from the base, got one whose radius of 70 reaches the tip in the feeder: "
-            "there is nothing to plan.",
+            "Expected a goal off the straight stretch of 15 from the base, got (70, 30, 20) with a radius of 70: "
+            "the arm meets it before it bends.",
+        ),
+        (
+            changed("goal.position", [10, 31, 20]),
+            "Expected a goal off the straight stretch of 15 from the base, got (10, 31, 20) with a radius of "
+            "2: the arm meets it before it bends.",
         ),
     ],
 )

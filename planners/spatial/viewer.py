@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import base64
-import html
 import importlib.resources
-import json
 import math
 import os
-import re
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,6 +19,7 @@ from hrsnake_env.arm import FloatArray
 from hrsnake_env.contacts import PINCH_TOLERANCE
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
+from hrsnake_env.pages import filled, framed
 from planners.spatial.problem import SpatialMotion
 from planners.spatial.solids import rectangles, solids
 from planners.spatial.workspace import Workspace
@@ -151,10 +149,8 @@ def page_html(scenes: Sequence[Scene], *, title: str | None = None, most_poses: 
         "clearanceScale": [FAR, PINCH_TOLERANCE],
         "scenes": [_packed_scene(scene, most_poses) for scene in scenes],
     }
-    parts = {"TITLE": html.escape(heading), "PAYLOAD": _json_in_html(payload)}
     template = importlib.resources.files("planners.spatial").joinpath("viewer.html")
-    # In one go, so that nothing in a title is taken for a place to fill.
-    return re.sub("__(TITLE|PAYLOAD)__", lambda place: parts[place[1]], template.read_text(encoding="utf-8"))
+    return filled(template.read_text(encoding="utf-8"), heading, payload)
 
 
 def show(scenes: Sequence[Scene], height: int = 720, *, title: str | None = None) -> Any:
@@ -179,22 +175,7 @@ def show(scenes: Sequence[Scene], height: int = 720, *, title: str | None = None
     InputError
         As `save_page`; or if IPython is not installed.
     """
-    try:
-        from IPython.display import IFrame
-    except ImportError:
-        raise InputError(
-            "Expected IPython to be installed, to show a page in a notebook: pip install "
-            "'hrsnake[notebooks]'."
-        ) from None
-    page = html.escape(page_html(scenes, title=title))
-    frame: Any = IFrame  # IPython's own functions are only partly typed
-    return frame("about:blank", "100%", height, extras=['sandbox="allow-scripts"', f'srcdoc="{page}"'])
-
-
-def _json_in_html(data: Any) -> str:
-    """Write JSON in which nothing can end the script element that holds it."""
-    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
-    return re.sub("[<>&]", lambda sign: f"\\u{ord(sign[0]):04x}", text)
+    return framed(page_html(scenes, title=title), height)
 
 
 def kept_poses(n_poses: int, worst: int | None, most: int) -> NDArray[np.int64]:

@@ -154,11 +154,6 @@ class Workspace:
             object.__setattr__(self, key, _positive(getattr(self, key), key))
         _store(self, "obstacles", self._obstacles())
         self._check_places()
-        if float(np.linalg.norm(self.goal - self.base)) <= self.goal_radius:
-            raise InputError(
-                f"Expected a goal away from the base, got one whose radius of {self.goal_radius:g} reaches "
-                f"the tip in the feeder: there is nothing to plan."
-            )
 
     def __repr__(self) -> str:
         assert self.boxes is not None
@@ -224,6 +219,12 @@ class Workspace:
             raise InputError(
                 f"Expected a straight stretch of {self.straight:g} from the base {_text(self.base)} that "
                 f"ends inside {room}, got its end at {_text(end)}."
+            )
+        along = float(np.clip((self.goal - self.base) @ self.heading, 0.0, self.straight))
+        if float(np.linalg.norm(self.base + along * self.heading - self.goal)) <= self.goal_radius:
+            raise InputError(
+                f"Expected a goal off the straight stretch of {self.straight:g} from the base, got "
+                f"{_text(self.goal)} with a radius of {self.goal_radius:g}: the arm meets it before it bends."
             )
 
     def base_pose_for(self, link_length: float) -> FloatArray:
