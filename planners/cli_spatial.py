@@ -41,7 +41,7 @@ spatial_app = typer.Typer(help="Plan, check and draw in three dimensions.", no_a
 WorkspaceArgument = Annotated[
     str, typer.Argument(metavar="WORKSPACE", help=f"A .json file, {', '.join(ROOMS)} or random-SEED.")
 ]
-PlannerOption = Annotated[str, typer.Option("--planner", help=f"{', '.join(PLANNERS)}.")]
+PlannerOption = Annotated[str, typer.Option("--planner", help=f"auto, {', '.join(PLANNERS)}.")]
 PageOption = Annotated[Path | None, typer.Option("--page", help="Write a page that turns and plays (.html).")]
 MotionOption = Annotated[Path | None, typer.Option("--out", help="Write the motion (.npz).")]
 
@@ -53,7 +53,7 @@ def plan_command(
     links: Annotated[int | None, typer.Option("--links", help="By default as many as it takes.")] = None,
     link_radius: RadiusOption = 0.0,
     joint_limit: LimitOption = None,
-    planner: PlannerOption = "track",
+    planner: PlannerOption = "auto",
     time_budget: Annotated[
         float, typer.Option("--time-budget", help="Seconds that planning may take.")
     ] = TIME_BUDGET,
@@ -118,7 +118,7 @@ def validate_command(
 @spatial_app.command("longest")
 def longest_command(
     workspace: WorkspaceArgument,
-    planner: PlannerOption = "track",
+    planner: PlannerOption = "auto",
     link_radius: RadiusOption = 0.0,
     joint_limit: LimitOption = None,
     accuracy: Annotated[float, typer.Option("--accuracy", help="As a share of the length.")] = 1e-3,

@@ -145,7 +145,7 @@ def test_progress_names_the_length(quick):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"planner": "magic"}, r"Unknown planner 'magic'\. Available: track, causal, follow\."),
+        ({"planner": "magic"}, r"Unknown planner 'magic'\. Available: auto, track, causal, follow\."),
         ({"accuracy": 0.0}, r"Expected accuracy to be a finite number of at least 1e-06, got 0\.0\."),
         ({"accuracy": math.nan}, r"Expected accuracy .*, got nan\."),
         ({"link_radius": -1.0}, r"Expected link_radius to be a finite number of at least 0, got -1\.0\."),

@@ -351,7 +351,7 @@ def test_a_motion_that_the_checker_refuses_is_never_handed_out(monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"planner": "magic"}, r"Unknown planner 'magic'\. Available: track, causal, follow\."),
+        ({"planner": "magic"}, r"Unknown planner 'magic'\. Available: auto, track, causal, follow\."),
         ({"time_budget": -1.0}, r"Expected a positive time_budget in seconds, got -1\.0\."),
         ({"time_budget": math.nan}, r"Expected a positive time_budget in seconds, got nan\."),
         ({"time_budget": "1"}, r"Expected a positive time_budget in seconds, got '1'\."),

@@ -517,9 +517,9 @@ TWICE = "it is inside out or has no thickness"
             f"{ROOM}, got its end at (-15, 30, 20).",
         ),
         (
-            changed("goal.radius", 70),
-            "Expected a goal off the straight stretch of 15 from the base, got (70, 30, 20) with a radius of 70: "
-            "the arm meets it before it bends.",
+            changed("goal.position", [10, 30, 20]),
+            "Expected a goal off the straight stretch of 15 from the base, got (10, 30, 20) with a radius of "
+            "2: the arm meets it before it bends.",
         ),
         (
             changed("goal.position", [10, 31, 20]),

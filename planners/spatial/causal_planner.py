@@ -68,6 +68,10 @@ ASTRAY = 2.5
 """A track that is this many times as long as the path winds about an obstacle which it cannot pass."""
 
 
+PATIENCE = 6
+"""How often a window is shaped at most, for each advance that the path is long."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Grown:
     """Hold what came of growing a track.
@@ -99,7 +103,7 @@ def grow_track(query: SpatialQuery, horizon: float = HORIZON) -> Grown:
     """
     growth, tries, failed = _Growth(query, horizon), 0, False
     furthest = growth.size
-    while True:
+    for _ in range(PATIENCE * (math.ceil(growth.total / (ADVANCE * growth.length)) + len(REMEDIES))):
         if query.late:
             return Grown(status=PlanningStatus.OUT_OF_TIME, track=growth.track)
         query.tell("plan", growth.seen / growth.total)
@@ -119,6 +123,7 @@ def grow_track(query: SpatialQuery, horizon: float = HORIZON) -> Grown:
             return Grown(status=PlanningStatus.SOLVED, track=growth.track)
         if growth.size > furthest:
             tries = 0
+    return Grown(status=PlanningStatus.DEAD_END, track=growth.track, failure=growth.failure())
 
 
 class _Growth:
@@ -224,10 +229,12 @@ class _Growth:
         self.window = self.window[self.piece :]
 
     def failure(self) -> Failure:
-        """Return the chord that is deepest in an obstacle, of those that end on the piece."""
+        """Return the chord on the piece that is deepest in an obstacle, or where the tip is if none is."""
         points = self.points[: self.fixed + self.piece]
         tip, rear, wall, depth = kernel.deepest_chord(points, self.fixed, self.length, self.swollen)
         way = self.straight + float(arclength(self.track)[-1])
+        if depth <= 0.0:
+            return Failure(place=tuple(self.track[-1].tolist()), path_position=way)
         return Failure(
             place=tuple(points[tip].tolist()),
             path_position=way + float(arclength(points[self.fixed - 1 : tip + 1])[-1]),
@@ -255,10 +262,11 @@ def _reason(query: SpatialQuery, grown: Grown) -> str:
     """Say why a track does not reach the goal."""
     if grown.failure is None:
         return f"Time was over before a track was shaped; its tip is at {place_text(grown.track[-1])}."
-    wall, depth, units = grown.failure.wall, grown.failure.depth, query.workspace.units
-    assert wall is not None and depth is not None
+    tip, units = place_text(grown.track[-1]), query.workspace.units
+    link = f"the link of {query.arm.link_length:g} {units}"
+    if grown.failure.wall is None:
+        return f"The tip cannot advance beyond {tip}: the track of {link} winds without becoming free."
     return (
-        f"The tip cannot advance beyond {place_text(grown.track[-1])}: the link of "
-        f"{query.arm.link_length:g} {units} that ends at {place_text(grown.failure.place)} would be "
-        f"{depth:.3g} {units} deep in {obstacle_text(query.workspace, wall)}."
+        f"The tip cannot advance beyond {tip}: {link} that ends at {place_text(grown.failure.place)} is "
+        f"{grown.failure.depth:.3g} {units} deep in {obstacle_text(query.workspace, grown.failure.wall)}."
     )

@@ -12,7 +12,7 @@ from hrsnake_env.arguments import check_at_least
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from planners.problem import PlanningStatus, Progress
-from planners.spatial.planning import PLANNERS, check_time_budget, plan
+from planners.spatial.planning import check_planner, check_time_budget, plan
 from planners.spatial.problem import SpatialMotion, SpatialResult
 from planners.spatial.workspace import Workspace
 
@@ -102,7 +102,7 @@ class SpatialLongest:
 
 def longest_link(
     workspace: Workspace,
-    planner: str = "track",
+    planner: str = "auto",
     *,
     link_radius: float = 0.0,
     joint_limit: float | None = None,
@@ -121,7 +121,7 @@ def longest_link(
     workspace : Workspace
         The workspace.
     planner : str
-        A key of `planners.spatial.PLANNERS`.
+        `auto` or a key of `planners.spatial.PLANNERS`.
     link_radius : float
         In workspace units.
     joint_limit : float, optional
@@ -138,8 +138,7 @@ def longest_link(
     InputError
         If the planner is unknown, a number is out of its range, or no arm of this radius fits the feeder.
     """
-    if planner not in PLANNERS:
-        raise InputError(f"Unknown planner {planner!r}. Available: {', '.join(PLANNERS)}.")
+    check_planner(planner)
     check_at_least("accuracy", accuracy, 1e-6)
     check_at_least("link_radius", link_radius, 0.0)
     check_time_budget(time_budget)

@@ -20,7 +20,7 @@ from planners.spatial.track_planner import plan_track
 from planners.spatial.validation import validate
 from planners.spatial.workspace import Workspace
 
-__all__ = ["PLANNERS", "TIME_BUDGET", "check_time_budget", "plan"]
+__all__ = ["AUTO", "PLANNERS", "TIME_BUDGET", "check_planner", "check_time_budget", "plan"]
 
 PLANNERS: dict[str, Callable[[SpatialQuery], SpatialCandidate]] = {
     "track": plan_track,
@@ -28,6 +28,9 @@ PLANNERS: dict[str, Callable[[SpatialQuery], SpatialCandidate]] = {
     "follow": plan_following,
 }
 """All spatial planners by name."""
+
+AUTO = ("track", "causal")
+"""Whom `auto` asks, in turn: what is missed by shaping a track as a whole may be found by growing it."""
 
 TIME_BUDGET = 60.0
 """Seconds that planning may take by default."""
@@ -69,7 +72,7 @@ class _Checker:
 def plan(
     workspace: Workspace,
     arm: ArmSpec,
-    planner: str = "track",
+    planner: str = "auto",
     *,
     time_budget: float = TIME_BUDGET,
     warm_start: SpatialResult | None = None,
@@ -84,7 +87,7 @@ def plan(
     arm : ArmSpec
         The arm, in workspace units. With `n_links` None it gets as many links as the motion needs.
     planner : str
-        A key of `PLANNERS`.
+        A key of `PLANNERS`, or `auto`, which asks the track and then the causal planner.
     time_budget : float
         In s. The outcome depends on it only if it runs out.
     warm_start : SpatialResult, optional
@@ -109,12 +112,10 @@ def plan(
     >>> result.status, result.motion.n_links
     (<PlanningStatus.SOLVED: 'solved'>, 15)
     """
-    if planner not in PLANNERS:
-        raise InputError(f"Unknown planner {planner!r}. Available: {', '.join(PLANNERS)}.")
+    check_planner(planner)
     check_time_budget(time_budget)
     workspace.check_arm(arm)
-    begin = time.perf_counter()
-    deadline = begin + time_budget
+    deadline = time.perf_counter() + time_budget
     checker = _Checker(workspace, arm, deadline, progress)
     query = SpatialQuery(
         workspace=workspace,
@@ -124,14 +125,31 @@ def plan(
         warm_start=_warm(warm_start),
         progress=progress,
     )
-    result = _answer(planner, query, checker)
-    attempt = Attempt(planner=planner, route=0, status=result.status, seconds=time.perf_counter() - begin)
-    return dataclasses.replace(
-        result,
-        attempts=(attempt,),
-        timings={**query.timings, "validate": checker.seconds},
-        path=None if warm_start is not None or query.path is None else query.path.points,
-    )
+    attempts: list[Attempt] = []
+    first: SpatialResult | None = None
+    for name in AUTO if planner == "auto" else (planner,):
+        begin, checker.seconds = time.perf_counter(), 0.0
+        result = _answer(name, query, checker)
+        seconds = time.perf_counter() - begin
+        attempts.append(Attempt(planner=name, route=0, status=result.status, seconds=seconds))
+        timings = {**query.timings, "validate": checker.seconds}
+        first = first or dataclasses.replace(result, timings=timings)
+        if result.solved:
+            first = dataclasses.replace(result, timings=timings)
+        if result.solved or query.late or result.status is PlanningStatus.NO_PATH:
+            break
+        query.timings = {
+            stage: query.timings[stage] for stage in ("potential", "path") if stage in query.timings
+        }
+    assert first is not None
+    path = None if warm_start is not None or query.path is None else query.path.points
+    return dataclasses.replace(first, attempts=tuple(attempts), path=path)
+
+
+def check_planner(planner: str) -> None:
+    """Raise InputError if there is no such planner."""
+    if planner != "auto" and planner not in PLANNERS:
+        raise InputError(f"Unknown planner {planner!r}. Available: auto, {', '.join(PLANNERS)}.")
 
 
 def check_time_budget(time_budget: float) -> None:

@@ -220,8 +220,9 @@ class Workspace:
                 f"Expected a straight stretch of {self.straight:g} from the base {_text(self.base)} that "
                 f"ends inside {room}, got its end at {_text(end)}."
             )
-        along = float(np.clip((self.goal - self.base) @ self.heading, 0.0, self.straight))
-        if float(np.linalg.norm(self.base + along * self.heading - self.goal)) <= self.goal_radius:
+        along = max(float((self.goal - self.base) @ self.heading), 0.0)
+        aside = float(np.linalg.norm(self.base + along * self.heading - self.goal))
+        if along < self.straight and aside <= self.goal_radius:
             raise InputError(
                 f"Expected a goal off the straight stretch of {self.straight:g} from the base, got "
                 f"{_text(self.goal)} with a radius of {self.goal_radius:g}: the arm meets it before it bends."
