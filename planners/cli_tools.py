@@ -40,7 +40,7 @@ INTERRUPTED = 130
 PICTURES = (".png", ".svg", ".pdf")
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")]
-RadiusOption = Annotated[float, typer.Option("--link-radius", help="Radius of the links, in maze units.")]
+RadiusOption = Annotated[float, typer.Option("--link-radius", help="Radius of the links, in the same units.")]
 LimitOption = Annotated[float | None, typer.Option("--joint-limit", help="Largest joint angle, in degrees.")]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -91,7 +92,9 @@ def validation_rows(world: World, motion: Motion | SpatialMotion, report: Valida
     yield (
         "penetration between poses",
         f"at most {report.penetration_between:.4g} {units} "
-        f"({report.penetration_between / length:.2g} link lengths; {PINCH_TOLERANCE:g} allowed)",
+        f"({report.penetration_between / length:.2g} link lengths; {PINCH_TOLERANCE:g} allowed)"
+        if math.isfinite(report.penetration_between)
+        else "not bounded",
     )
     yield "largest joint step", f"{report.largest_step / length:.3f} link lengths"
     yield "tip to goal", f"{report.goal_distance:.3g} {units} (radius {world.goal_radius:g})"

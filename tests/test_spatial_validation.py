@@ -520,7 +520,7 @@ def test_the_joint_limit_is_on_the_whole_bend():
 
 def curled(out_of_plane):
     """Curl an arm of five links to a pentagon and beyond, its last link beside the first or into it."""
-    workspace = space(goal=(3.0, 1.0, 0.0))
+    workspace = space(goal=(3.0, 1.5, 0.0))
     angles = np.tile((1.5, 0.0), (5, 1))
     angles[0] = 0.0
     angles[3, 1] = out_of_plane
@@ -726,3 +726,23 @@ def test_a_motion_in_a_plane_is_judged_as_by_the_checker_in_the_plane(feed, turn
         assert report.clearance == pytest.approx(wanted.clearance, abs=1e-9)
     else:
         assert report.clearance < 0.0
+
+
+@pytest.mark.parametrize("thickness", [1e-4, 0.01, 0.04, 0.1, 1.0])
+def test_no_wall_is_so_thin_that_a_link_may_pass_through_it_between_poses(thickness):
+    # The last link swings past a fin that lies along it between two poses: no depth is over half of it.
+    fin = [[LENGTH - thickness / 2.0, 4.0, -5.0], [LENGTH + thickness / 2.0, 8.0, 5.0]]
+    swing = [[0.0, 0.0], [2.0, 0.0]]
+    kinds = kinds_of(validate(bent(space(), 2, swing), space()))
+    assert not kinds & {"penetration", "sweep"}
+    kinds = kinds_of(validate(bent(space(fin), 2, swing), space(fin)))
+    assert kinds & {"penetration", "sweep"}
+    assert thickness > 1e-3 or "penetration" not in kinds
+
+
+@pytest.mark.parametrize("turn", [1.5, 3.0, math.pi, 2.0 * math.pi])
+def test_a_joint_does_not_turn_about_between_two_poses(turn):
+    workspace, angles = space(), np.zeros((3, 1, 2))
+    angles[2, 0, 0] = turn
+    report = validate(moved(workspace, [0.0, 5.0, 5.0], angles), workspace)
+    assert kinds_of(report) & {"step", "crossing"}

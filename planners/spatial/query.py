@@ -77,7 +77,7 @@ class SpatialQuery:
         what = "a point" if self.arm.link_radius == 0.0 else "a ball of the links' radius"
         return SpatialCandidate(
             status=PlanningStatus.NO_PATH,
-            reason=f"No path from the base to the goal was found, not even for {what}.",
+            reason=f"No path from the base to the goal was found on the finest grid, not even for {what}.",
         )
 
     @property

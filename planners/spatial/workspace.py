@@ -263,6 +263,15 @@ class Workspace:
                 f"'{self.name}', as the straight feed allows ({self.straight:g} past the base, {behind:g} "
                 f"behind it), got {arm.link_length:g}."
             )
+        base = self.base_pose_for(arm.link_length)[:3]
+        nearest = np.clip(base, self.obstacles[:, 0], self.obstacles[:, 1])
+        room = float(np.linalg.norm(nearest - base, axis=1).min(initial=np.inf))
+        if room < arm.link_radius:
+            raise InputError(
+                f"Expected at least the link radius of {arm.link_radius:g} {self.units} of room about "
+                f"the base of workspace '{self.name}', got {room:g}: move the base into the room, or open "
+                f"the side behind it."
+            )
 
     def _free_along(self, way: FloatArray, radius: float) -> float:
         """Return how far from the base the way is free for a rod of a radius; infinite without obstacles.

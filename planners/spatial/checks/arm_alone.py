@@ -11,6 +11,9 @@ from planners.spatial.kinematics import joints_from_configuration
 STEP_LIMIT = 0.05
 """Largest movement of a joint between two poses, in link lengths; as in the plane."""
 
+TURN_LIMIT = 1.0
+"""Largest turn of a joint between two poses, in rad: with more, links could sweep about and come back."""
+
 
 def check_lengths(scene: Scene) -> tuple[float, Fault | None]:
     """Check that every link has its exact length; return the largest deviation too."""
@@ -89,9 +92,16 @@ def check_goal(scene: Scene) -> tuple[float, Fault | None]:
 
 
 def check_steps(scene: Scene) -> tuple[float, Fault | None]:
-    """Check that no joint moves too far between two poses; return the largest movement too."""
+    """Check that no joint moves or turns too far between two poses; return the largest movement too."""
     if scene.motion.n_poses == 1:
         return 0.0, None
+    turns = np.linalg.norm(np.diff(scene.motion.joint_angles, axis=0), axis=2)
+    turn, pose, joint = worst_of(turns)
+    if turn > TURN_LIMIT:
+        figure = f"{turn:.6g} rad, more than {TURN_LIMIT:g}"
+        message = f"Joint {joint} turns by {figure}, between poses {pose} and {pose + 1}."
+        moved = float(np.linalg.norm(np.diff(scene.motion.joints, axis=0), axis=2).max())
+        return moved, joint_fault(scene, "step", message, pose, joint, turn)
     steps = np.linalg.norm(np.diff(scene.motion.joints, axis=0), axis=2)
     amount, pose, joint = worst_of(steps)
     if amount <= STEP_LIMIT * scene.length * (1.0 + ROUNDING):

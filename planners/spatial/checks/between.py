@@ -110,12 +110,13 @@ def _swept(scene: Scene, pieces: _Pieces) -> tuple[float, list[_Pieces]]:
     for level in range(MAX_SPLITS + 1):
         if not len(pieces):
             break
-        limit = scene.tolerance * (0.0, 1.0 / 8.0, 1.0)[np.searchsorted(PATIENCE, level, side="right")]
+        allowed = scene.tolerances[pieces.box]
+        limit = allowed * (0.0, 1.0 / 8.0, 1.0)[np.searchsorted(PATIENCE, level, side="right")]
         moves = scene.moves(pieces.step, pieces.link, pieces.time)
         depth, distance = _depths(scene, moves, pieces.box, limit)
         left = depth > limit
         bound = max(bound, float(np.max(depth, where=~left, initial=0.0)))
-        pieces, is_deep = pieces[left], distance[left] < scene.radius - scene.tolerance
+        pieces, is_deep = pieces[left], distance[left] < scene.radius - allowed[left]
         deep.append(pieces[is_deep])
         if level == MAX_SPLITS or 2 * len(pieces) > MAX_PIECES:
             break
@@ -125,7 +126,7 @@ def _swept(scene: Scene, pieces: _Pieces) -> tuple[float, list[_Pieces]]:
     return bound, [*deep, pieces]
 
 
-def _depths(scene: Scene, moves: Moves, box: IntArray, limit: float) -> tuple[FloatArray, FloatArray]:
+def _depths(scene: Scene, moves: Moves, box: IntArray, limit: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Bound how deep links on their way get in boxes, and compute how far they are from them half way.
 
     What is not deeper than `limit` by the planes of faces and links is not measured half way (infinite).
@@ -167,7 +168,7 @@ def _sweep_fault(scene: Scene, open_: list[_Pieces]) -> Fault:
     index = int(np.argmin(distance))
     amount = scene.radius - float(distance[index])
     what = f"gets {scene.figure(amount)} deep in an obstacle"
-    if amount <= scene.tolerance:
+    if amount <= scene.tolerances[samples.box[index]]:
         amount, what = (
             math.inf,
             f"could not be shown to get at most {PINCH_TOLERANCE:g} link lengths deep in an obstacle",

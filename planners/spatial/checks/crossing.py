@@ -38,12 +38,11 @@ def check_crossing(scene: Scene, tell: Progress) -> Fault | None:
     and both e, bounds the distance within.
     """
     motion = scene.motion
-    if motion.n_links > 1:
-        bends = np.hypot(motion.joint_angles[:, 1:, 0], motion.joint_angles[:, 1:, 1])
-        amount, pose, joint = worst_of(bends)
-        if amount >= math.pi - ROUNDING:
-            message = f"Link {joint + 1} lies folded back on link {joint} at pose {pose}."
-            return joint_fault(scene, "crossing", message, pose, joint + 1, 0.0)
+    amount, pose, joint = worst_of(np.hypot(motion.joint_angles[..., 0], motion.joint_angles[..., 1]))
+    if amount >= math.pi - ROUNDING:
+        behind = f"link {joint - 1}" if joint else "the feeder"
+        message = f"Link {joint} lies folded back on {behind} at pose {pose}."
+        return joint_fault(scene, "crossing", message, pose, joint, 0.0)
     n_steps = motion.n_poses - 1
     if n_steps == 0:
         pairs = _at_single_pose(scene)

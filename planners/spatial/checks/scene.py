@@ -92,6 +92,15 @@ class Scene:
         return PINCH_TOLERANCE * self.length
 
     @cached_property
+    def tolerances(self) -> FloatArray:
+        """The largest depth in each obstacle between two poses, in workspace units, shape (n_boxes,).
+
+        In a thin wall depths are small even where a link passes right through it.
+        """
+        thinnest = np.ptp(self.boxes, axis=1).min(axis=1, initial=np.inf)
+        return np.asarray(np.minimum(self.tolerance, thinnest / 8.0))
+
+    @cached_property
     def slack(self) -> float:
         """What counts as rounding where places in the workspace are compared, in workspace units."""
         size = np.abs(self.boxes).max(initial=0.0)
