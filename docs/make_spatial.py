@@ -34,7 +34,7 @@ def part(results: Mapping[str, Any], name: str) -> str:
 def short(results: Mapping[str, Any]) -> str:
     """Return the README's table."""
     lines = [
-        "| paired panels | links | in obstacles by | smallest distance | time per pose | whole plan |",
+        "| paired panels | links x length | in obstacles by | distance | time per pose | whole plan |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
     for row in results["figures"]:

@@ -126,11 +126,11 @@ show(
 # %% [markdown]
 # ## How long may a link be?
 #
-# The joint behind the front link is on the axis until it is 90 past the base. The front joint must then be
-# through the first window, of 60 by 60 about the axis and up to 150 along it, but cannot have reached the
-# second panel at 200, whose window is elsewhere. So no link is longer than 110 units times the steepest slope
-# there is: the square root of 1.5, 134.7 in all. `hrsnake spatial longest paired-panels` searches; here are
-# four lengths.
+# A link whose rear joint comes to the end of the straight stretch, 90 past the base, with its front joint
+# through the first window (of 60 by 60 about the axis, up to 150 along it), cannot have reached the second
+# panel at 200, whose window is elsewhere. That leaves 110 units along the axis at a slope of 1 : 1/2 : 1/2 at
+# most: 110 times the square root of 1.5, 134.7 in all. `hrsnake spatial longest paired-panels` searches;
+# here are some lengths.
 
 # %%
 for length in (57.0, 58.0):

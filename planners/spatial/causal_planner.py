@@ -3,7 +3,8 @@
 The track planner shapes one curve as a whole. Here the way ahead is seen up to a horizon alone. The track
 behind the tip is fixed, as rear joints must run on it. The stretch up to the horizon is shaped as in the
 track planner, with its far end on the path. Then the tip advances by a part of a link, which fixes that
-much, more of the path comes into sight, and so on. Only what is free and has no cusp is fixed.
+much, more of the path comes into sight, and so on. Only what is free is fixed, and as long as anything is
+left to try, only what has no cusp.
 
 Where that fails, the chords in sight are grown once more from shorter ones, and then the tip withdraws by up
 to half a link on its own track: what it sees by then may ask for an earlier turn. The motion handed on
