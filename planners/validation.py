@@ -43,7 +43,6 @@ from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners.checks.arm_alone import (
-    STEP_LIMIT,
     check_consistency,
     check_feeder,
     check_goal,
@@ -55,8 +54,9 @@ from planners.checks.arm_alone import (
 )
 from planners.checks.between import check_between
 from planners.checks.crossing import check_crossing
-from planners.checks.scene import PINCH_TOLERANCE, ROUNDING, Scene
+from planners.checks.scene import Scene
 from planners.checks.sieve import sift
+from planners.checks.tolerances import PINCH_TOLERANCE, ROUNDING, STEP_LIMIT
 from planners.checks.walls import check_poses
 from planners.problem import Motion, Progress, ValidationReport
 

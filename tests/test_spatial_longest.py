@@ -10,9 +10,10 @@ from hrsnake_env.errors import InputError
 from planners import PlanningStatus
 from planners.spatial import longest
 from planners.spatial.longest import longest_link
+from planners.spatial.panel import Panel
 from planners.spatial.planning import plan
 from planners.spatial.validation import validate
-from planners.spatial.workspace import SIDES, Panel, Workspace
+from planners.spatial.workspace import SIDES, Workspace
 
 
 def room(**changes):

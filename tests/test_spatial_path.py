@@ -13,10 +13,11 @@ from scipy.sparse.linalg import splu
 from hrsnake_env.errors import InputError
 from planners import path as planar
 from planners.spatial import potential as field
+from planners.spatial.panel import Panel
 from planners.spatial.path import descend, global_path
 from planners.spatial.potential import laplace_potential
 from planners.spatial.rooms import paired_panels, random_room
-from planners.spatial.workspace import Panel, Workspace
+from planners.spatial.workspace import Workspace
 
 ROUNDING = 1e-9
 

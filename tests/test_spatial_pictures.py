@@ -18,11 +18,12 @@ from hrsnake_env.appearance import COLOURS
 from hrsnake_env.errors import InputError
 from planners.spatial import viewer
 from planners.spatial.drawing import draw_motion
+from planners.spatial.panel import Panel
 from planners.spatial.problem import SpatialMotion
 from planners.spatial.rooms import paired_panels, random_room
 from planners.spatial.solids import Stroke, from_behind, rectangles, solids
 from planners.spatial.viewer import MOST_POSES, QUANTUM, Scene, page_html, save_page, show
-from planners.spatial.workspace import Panel, Workspace
+from planners.spatial.workspace import Workspace
 
 WORST = 33
 

@@ -9,12 +9,13 @@ import pytest
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from planners import PlanningStatus
+from planners.spatial.panel import Panel
 from planners.spatial.path import Path
 from planners.spatial.planning import PLANNERS, plan
 from planners.spatial.problem import SpatialCandidate
 from planners.spatial.rooms import paired_panels, random_room
 from planners.spatial.validation import signed_distances, validate
-from planners.spatial.workspace import SIDES, Panel, Workspace
+from planners.spatial.workspace import SIDES, Workspace
 
 
 def room(**changes):

@@ -12,8 +12,9 @@ from hypothesis.extra.numpy import arrays
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
+from planners.spatial.panel import Panel
 from planners.spatial.rooms import ROOMS, load_workspace, paired_panels, random_room
-from planners.spatial.workspace import SIDES, Panel, Workspace
+from planners.spatial.workspace import SIDES, Workspace
 
 AXIS = st.integers(0, 2)
 WAYS = st.one_of(

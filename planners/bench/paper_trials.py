@@ -16,8 +16,9 @@ from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import LEGS, corridor_family
 from planners.baselines.path_following import plan_path_following
 from planners.beam_planner import AS_PRINTED, CLAMPED, Rules, run_beam
-from planners.checks.arm_alone import STEP_LIMIT, check_steps
-from planners.checks.scene import CHUNK, ROUNDING, Scene, prepared
+from planners.checks.arm_alone import check_steps
+from planners.checks.scene import CHUNK, Scene, prepared
+from planners.checks.tolerances import ROUNDING, STEP_LIMIT
 from planners.checks.walls import nearest
 from planners.kernels.beam_arm import GOAL
 from planners.kernels.types import FloatArray

@@ -7,11 +7,9 @@ import math
 import numpy as np
 
 from hrsnake_env.arm import FloatArray, feeder_angle_limits, joints_from_configuration
-from planners.checks.scene import PLACE_SLACK, ROUNDING, Scene, joint_fault, worst_of
+from planners.checks.scene import PLACE_SLACK, Scene, joint_fault, worst_of
+from planners.checks.tolerances import ROUNDING, STEP_LIMIT
 from planners.problem import Fault
-
-STEP_LIMIT = 0.05
-"""Largest movement of a joint between two poses, in link lengths."""
 
 ANGLE_SLACK = 1e-6
 """Of the angles that the feeder leaves, in rad."""

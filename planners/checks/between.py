@@ -12,18 +12,8 @@ import shapely
 
 from hrsnake_env.arm import FloatArray
 from planners.checks.gaps import Walls, complex_from_points, depths_from_gaps, moves_evenly
-from planners.checks.scene import (
-    MAX_SPLITS,
-    PINCH_TOLERANCE,
-    ROUNDING,
-    BoolArray,
-    Geometry,
-    IntArray,
-    Scene,
-    halves,
-    point_of,
-    prepared,
-)
+from planners.checks.scene import MAX_SPLITS, BoolArray, Geometry, IntArray, Scene, halves, point_of, prepared
+from planners.checks.tolerances import PINCH_TOLERANCE, ROUNDING
 from planners.checks.walls import are_deep, nearest
 from planners.problem import Fault, Progress
 

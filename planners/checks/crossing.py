@@ -7,17 +7,8 @@ import math
 import numpy as np
 import shapely
 
-from planners.checks.scene import (
-    CHUNK,
-    MAX_SPLITS,
-    ROUNDING,
-    IntArray,
-    Scene,
-    halves,
-    joint_fault,
-    point_of,
-    worst_of,
-)
+from planners.checks.scene import CHUNK, MAX_SPLITS, IntArray, Scene, halves, joint_fault, point_of, worst_of
+from planners.checks.tolerances import ROUNDING
 from planners.problem import Fault, Progress
 
 

@@ -14,13 +14,8 @@ from shapely.geometry import Polygon
 
 from hrsnake_env.arm import FloatArray, joints_from_configuration
 from hrsnake_env.maze import Maze
+from planners.checks.tolerances import PINCH_TOLERANCE, ROUNDING
 from planners.problem import Fault, Motion
-
-PINCH_TOLERANCE = 1e-3
-"""Largest depth of a link in a wall between two poses, in link lengths."""
-
-ROUNDING = 1e-9
-"""What counts as rounding, in link lengths."""
 
 PLACE_SLACK = 1e-6
 """How far joints may be from where configuration, feeder and start put them, in link lengths."""

@@ -25,7 +25,8 @@ from planners.checks.gaps import (
     segment_distances,
     slices,
 )
-from planners.checks.scene import PINCH_TOLERANCE, ROUNDING, BoolArray, IntArray, Scene
+from planners.checks.scene import BoolArray, IntArray, Scene
+from planners.checks.tolerances import PINCH_TOLERANCE, ROUNDING
 from planners.problem import Progress
 
 SIZES = (64, 16, 4, 1)

@@ -8,17 +8,8 @@ import numpy as np
 import shapely
 
 from hrsnake_env.arm import FloatArray
-from planners.checks.scene import (
-    CHUNK,
-    PINCH_TOLERANCE,
-    PLACE_SLACK,
-    ROUNDING,
-    BoolArray,
-    Nearest,
-    Scene,
-    point_of,
-    worst_of,
-)
+from planners.checks.scene import CHUNK, PLACE_SLACK, BoolArray, Nearest, Scene, point_of, worst_of
+from planners.checks.tolerances import PINCH_TOLERANCE, ROUNDING
 from planners.problem import Fault, Progress
 
 

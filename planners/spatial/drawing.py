@@ -27,9 +27,10 @@ from hrsnake_env.appearance import COLOURS, FEEDER_SHARE, RGB, link_colours, mix
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
+from planners.spatial.panel import AXES
 from planners.spatial.problem import SpatialMotion
 from planners.spatial.solids import Face, Solid, Stroke, from_behind, lifted, solids
-from planners.spatial.workspace import AXES, Workspace
+from planners.spatial.workspace import Workspace
 
 __all__ = ["draw_motion", "feeder_ends"]
 

@@ -11,7 +11,8 @@ from hrsnake_env.arguments import check_at_least
 from hrsnake_env.errors import InputError
 from planners.kernels.spatial_field import IndexArray, add_slowest_modes, flood, neighbours_of, relax
 from planners.kernels.types import BoolArray, FloatArray, IntArray
-from planners.spatial.workspace import AXES, Workspace
+from planners.spatial.panel import AXES
+from planners.spatial.workspace import Workspace
 
 __all__ = ["Potential", "laplace_potential"]
 

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.errors import InputError
-from planners.spatial.workspace import AXES, Panel, Workspace
+from planners.spatial.panel import AXES, Panel
+from planners.spatial.workspace import Workspace
 
 __all__ = ["ROOMS", "load_workspace", "paired_panels", "panels_in_a_row", "random_room"]
 

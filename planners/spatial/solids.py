@@ -12,7 +12,8 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from hrsnake_env.arm import FloatArray
-from planners.spatial.workspace import AXES, Workspace
+from planners.spatial.panel import AXES
+from planners.spatial.workspace import Workspace
 
 __all__ = ["Face", "Solid", "Stroke", "from_behind", "lifted", "rectangles", "solids"]
 

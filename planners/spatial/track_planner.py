@@ -15,7 +15,6 @@ from __future__ import annotations
 import dataclasses
 import math
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +25,7 @@ from planners.kernels import feeding as feeding_kernel
 from planners.kernels import spatial_track as kernel
 from planners.path import arclength, resampled
 from planners.problem import Failure, PlanningStatus
+from planners.spatial.entries import point_text
 from planners.spatial.following import follow_path
 from planners.spatial.problem import SpatialCandidate, SpatialMotion
 from planners.spatial.query import SpatialQuery
@@ -35,7 +35,6 @@ __all__ = [
     "Track",
     "candidate_along",
     "obstacle_text",
-    "place_text",
     "plan_track",
     "track_from_curve",
 ]
@@ -180,7 +179,7 @@ def candidate_along(query: SpatialQuery, curve: FloatArray) -> SpatialCandidate:
         status=PlanningStatus.DEAD_END,
         track=curve,
         reason=(
-            f"With the tip at {place_text(fed.place)} a joint would have to jump: the track turns across the "
+            f"With the tip at {point_text(fed.place)} a joint would have to jump: the track turns across the "
             f"link of {length:g} {query.workspace.units} that starts there."
         ),
         failure=Failure(place=fed.place, joints=fed.poses[-1]),
@@ -240,7 +239,7 @@ def _dead_end(query: SpatialQuery, track: Track) -> SpatialCandidate:
         status=PlanningStatus.DEAD_END,
         track=track.points,
         reason=(
-            f"No track was found on which {links} are free: the link that ends at {place_text(place)} is "
+            f"No track was found on which {links} are free: the link that ends at {point_text(place)} is "
             f"{depth:.3g} {units} deep in {obstacle_text(query.workspace, wall)}."
         ),
         failure=Failure(
@@ -257,9 +256,4 @@ def _dead_end(query: SpatialQuery, track: Track) -> SpatialCandidate:
 def obstacle_text(workspace: Workspace, number: int) -> str:
     """Write which obstacle is meant."""
     low, high = workspace.obstacle_in_room(number)
-    return f"the obstacle from {place_text(low)} to {place_text(high)}"
-
-
-def place_text(place: Sequence[float] | FloatArray) -> str:
-    """Write a place as (x, y, z)."""
-    return "(" + ", ".join(f"{value:.4g}" for value in place) + ")"
+    return f"the obstacle from {point_text(low)} to {point_text(high)}"

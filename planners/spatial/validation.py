@@ -35,9 +35,9 @@ from numpy.typing import ArrayLike
 
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.errors import InputError
+from planners.checks.tolerances import PINCH_TOLERANCE, ROUNDING, STEP_LIMIT
 from planners.problem import Progress, ValidationReport
 from planners.spatial.checks.arm_alone import (
-    STEP_LIMIT,
     check_consistency,
     check_feeder,
     check_goal,
@@ -48,7 +48,7 @@ from planners.spatial.checks.arm_alone import (
 )
 from planners.spatial.checks.between import check_between
 from planners.spatial.checks.crossing import check_crossing
-from planners.spatial.checks.scene import PINCH_TOLERANCE, ROUNDING, Scene
+from planners.spatial.checks.scene import Scene
 from planners.spatial.checks.walls import check_poses, nearest_of_each
 from planners.spatial.problem import SpatialMotion
 from planners.spatial.workspace import Workspace

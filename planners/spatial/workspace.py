@@ -3,86 +3,39 @@
 from __future__ import annotations
 
 import json
-import math
 import os
-import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hrsnake_env.arguments import is_number, numbers
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
+from planners.spatial.entries import (
+    boxes_of,
+    check_keys,
+    corners_of,
+    kind_of,
+    list_of,
+    point_text,
+    positive,
+    store,
+    store_box,
+    string_of,
+    unit_of,
+    vector_of,
+)
+from planners.spatial.panel import AXES, Panel, panel_from_dict
 
-__all__ = ["Panel", "Workspace"]
+__all__ = ["Workspace"]
 
-AXES = "xyz"
 SIDES = ("x-", "x+", "y-", "y+", "z-", "z+")
 """Sides of a room: at the low and at the high end of each axis."""
 
 MARK = "hrsnake workspace"
 """What a workspace file calls itself."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Panel:
-    """Describe a wall of some thickness with one rectangular window.
-
-    Parameters
-    ----------
-    low, high : array-like, shape (3,)
-        Two opposite corners of the whole panel, window included.
-    normal : str
-        `x`, `y` or `z`: the axis along which the window goes through.
-    window_low, window_high : array-like, shape (3,)
-        Two opposite corners of the window. Along the normal they are those of the panel.
-
-    Raises
-    ------
-    InputError
-        If a box is inside out or the window is not in the panel.
-    """
-
-    low: FloatArray
-    high: FloatArray
-    normal: str
-    window_low: FloatArray
-    window_high: FloatArray
-
-    def __post_init__(self) -> None:
-        if self.normal not in tuple(AXES):
-            raise InputError(f"Expected the normal of a panel to be x, y or z, got {self.normal!r}.")
-        _store_box(self, "low", "high", "a panel")
-        axis = AXES.index(self.normal)
-        for key, limit in (("window_low", self.low), ("window_high", self.high)):
-            corner = _vector(getattr(self, key), "a corner of the window of a panel")
-            corner[axis] = limit[axis]
-            object.__setattr__(self, key, corner)
-        _store_box(self, "window_low", "window_high", "the window of a panel")
-        if not ((self.window_low >= self.low).all() and (self.window_high <= self.high).all()):
-            raise InputError(
-                f"Expected the window of a panel inside it, from {_text(self.low)} to {_text(self.high)}, "
-                f"got one from {_text(self.window_low)} to {_text(self.window_high)}."
-            )
-
-    @property
-    def boxes(self) -> FloatArray:
-        """The panel as up to four boxes, shape (n, 2, 3): all of it beyond each edge of the window.
-
-        They overlap at the corners. Boxes that merely abut would have seams, at which the way out of a wall
-        would point into the next.
-        """
-        found = []
-        for axis in range(3):
-            if axis == AXES.index(self.normal):
-                continue
-            below, above = np.stack([self.low, self.high]), np.stack([self.low, self.high])
-            below[1, axis], above[0, axis] = self.window_low[axis], self.window_high[axis]
-            found += [box for box in (below, above) if box[1, axis] > box[0, axis]]
-        return np.array(found).reshape(-1, 2, 3)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -138,21 +91,21 @@ class Workspace:
     units: str = "units"
 
     def __post_init__(self) -> None:
-        _store_box(self, "room_low", "room_high", "a room")
+        store_box(self, "room_low", "room_high", "a room")
         for side in self.open_sides:
             if side not in SIDES:
                 raise InputError(f"Unknown side of a room {side!r}. Available: {', '.join(SIDES)}.")
         object.__setattr__(self, "open_sides", tuple(self.open_sides))
         object.__setattr__(self, "panels", tuple(self.panels))
-        _store(self, "boxes", _boxes(self.boxes))
+        store(self, "boxes", boxes_of(self.boxes))
         for key in ("base", "heading", "goal"):
-            _store(self, key, _vector(getattr(self, key), f"the {key}"))
+            store(self, key, vector_of(getattr(self, key), f"the {key}"))
         if not self.heading.any():
             raise InputError("Expected a heading of some length, got (0, 0, 0).")
-        _store(self, "heading", _unit(self.heading))
+        store(self, "heading", unit_of(self.heading))
         for key in ("straight", "goal_radius"):
-            object.__setattr__(self, key, _positive(getattr(self, key), key))
-        _store(self, "obstacles", self._obstacles())
+            object.__setattr__(self, key, positive(getattr(self, key), key))
+        store(self, "obstacles", self._obstacles())
         self._check_places()
 
     def __repr__(self) -> str:
@@ -197,11 +150,11 @@ class Workspace:
         return np.concatenate([walls, np.array(sides).reshape(-1, 2, 3)])
 
     def _check_places(self) -> None:
-        room = f"the room, from {_text(self.room_low)} to {_text(self.room_high)}"
+        room = f"the room, from {point_text(self.room_low)} to {point_text(self.room_high)}"
         if not ((self.base >= self.room_low).all() and (self.base <= self.room_high).all()):
-            raise InputError(f"Expected a base in {room}, got {_text(self.base)}.")
+            raise InputError(f"Expected a base in {room}, got {point_text(self.base)}.")
         if not ((self.goal > self.room_low).all() and (self.goal < self.room_high).all()):
-            raise InputError(f"Expected a goal inside {room}, got {_text(self.goal)}.")
+            raise InputError(f"Expected a goal inside {room}, got {point_text(self.goal)}.")
         low, high = self.obstacles[:, 0], self.obstacles[:, 1]
         for what, place, within in (
             ("base", self.base, (self.base > low) & (self.base < high)),
@@ -211,21 +164,22 @@ class Workspace:
                 # One of the walls, which come first: the place is not beyond a side of the room.
                 box = self.walls[int(np.argmax(within.all(axis=1)))]
                 raise InputError(
-                    f"Expected a {what} in the free space, got {_text(place)}, which is in the obstacle from "
-                    f"{_text(box[0])} to {_text(box[1])}."
+                    f"Expected a {what} in the free space, got {point_text(place)}, which is in the obstacle "
+                    f"from {point_text(box[0])} to {point_text(box[1])}."
                 )
         end = self.base + self.straight * self.heading
         if not ((end > self.room_low).all() and (end < self.room_high).all()):
             raise InputError(
-                f"Expected a straight stretch of {self.straight:g} from the base {_text(self.base)} that "
-                f"ends inside {room}, got its end at {_text(end)}."
+                f"Expected a straight stretch of {self.straight:g} from the base {point_text(self.base)} "
+                f"that ends inside {room}, got its end at {point_text(end)}."
             )
         along = max(float((self.goal - self.base) @ self.heading), 0.0)
         aside = float(np.linalg.norm(self.base + along * self.heading - self.goal))
         if along < self.straight and aside <= self.goal_radius:
             raise InputError(
                 f"Expected a goal off the straight stretch of {self.straight:g} from the base, got "
-                f"{_text(self.goal)} with a radius of {self.goal_radius:g}: the arm meets it before it bends."
+                f"{point_text(self.goal)} with a radius of {self.goal_radius:g}: the arm meets it before it "
+                f"bends."
             )
 
     def base_pose_for(self, link_length: float) -> FloatArray:
@@ -328,23 +282,23 @@ class Workspace:
             If something is missing, unknown or wrong.
         """
         if not isinstance(data, dict) or data.get("type") != MARK:
-            raise InputError(f'Expected a workspace with "type": "{MARK}", got {_kind(data)}.')
+            raise InputError(f'Expected a workspace with "type": "{MARK}", got {kind_of(data)}.')
         known = ("type", "name", "units", "room", "panels", "boxes", "base", "goal")
-        _check_keys(data, "a workspace", known, ("room", "base", "goal"))
+        check_keys(data, "a workspace", known, ("room", "base", "goal"))
         room, base, goal = data["room"], data["base"], data["goal"]
         of_base, of_goal = ("position", "heading", "straight"), ("position", "radius")
-        _check_keys(room, "the room", ("low", "high", "open"), ("low", "high"))
-        _check_keys(base, "the base", of_base, of_base)
-        _check_keys(goal, "the goal", of_goal, of_goal)
-        panels, boxes = (_list(data.get(key, []), key) for key in ("panels", "boxes"))
+        check_keys(room, "the room", ("low", "high", "open"), ("low", "high"))
+        check_keys(base, "the base", of_base, of_base)
+        check_keys(goal, "the goal", of_goal, of_goal)
+        panels, boxes = (list_of(data.get(key, []), key) for key in ("panels", "boxes"))
         return cls(
-            name=_string(data.get("name", default_name), "the name of a workspace"),
-            units=_string(data.get("units", "units"), "the units of a workspace"),
+            name=string_of(data.get("name", default_name), "the name of a workspace"),
+            units=string_of(data.get("units", "units"), "the units of a workspace"),
             room_low=room["low"],
             room_high=room["high"],
-            open_sides=tuple(_list(room.get("open", []), "the open sides of the room")),
-            panels=tuple(_panel(one, number) for number, one in enumerate(panels)),
-            boxes=np.array([_corners(one, f"box {number}") for number, one in enumerate(boxes)]),
+            open_sides=tuple(list_of(room.get("open", []), "the open sides of the room")),
+            panels=tuple(panel_from_dict(one, number) for number, one in enumerate(panels)),
+            boxes=np.array([corners_of(one, f"box {number}") for number, one in enumerate(boxes)]),
             base=base["position"],
             heading=base["heading"],
             straight=base["straight"],
@@ -395,111 +349,3 @@ def _slab(low: FloatArray, high: FloatArray, axis: int, start: float | None, end
     if end is not None:
         slab[1, axis] = end
     return slab
-
-
-def _store(record: Any, key: str, array: FloatArray) -> None:
-    array = np.array(array, dtype=np.float64)
-    array.setflags(write=False)
-    object.__setattr__(record, key, array)
-
-
-def _vector(value: Any, what: str) -> FloatArray:
-    try:
-        vector = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        vector = np.empty(0)
-    # NumPy takes True and "1" for numbers.
-    if vector.shape != (3,) or not np.isfinite(vector).all() or not all(map(is_number, value)):
-        came = " ".join(repr(value).split())
-        raise InputError(f"Expected {what} as three finite numbers (x, y, z), got {came}.")
-    return vector
-
-
-def _unit(vector: FloatArray) -> FloatArray:
-    """Return a vector of length 1 along another; itself if it is one but for rounding."""
-    if abs(math.hypot(*vector) - 1.0) <= 4.0 * np.finfo(np.float64).eps:
-        return vector
-    # First by the largest number, as squares may be too large or too small.
-    vector = vector / np.abs(vector).max()
-    return np.asarray(vector / math.hypot(*vector), dtype=np.float64)
-
-
-def _positive(value: Any, what: str) -> float:
-    if not is_number(value) or not 0.0 < value <= sys.float_info.max:
-        raise InputError(f"Expected {what} to be positive and finite, got {value!r}.")
-    return float(value)
-
-
-def _string(value: Any, what: str) -> str:
-    if not isinstance(value, str):
-        raise InputError(f"Expected {what} as a text, got {_kind(value)}.")
-    return value
-
-
-def _boxes(value: Any) -> FloatArray:
-    boxes = numbers("boxes", [] if value is None else value)
-    if boxes.shape == (0,):
-        return boxes.reshape(0, 2, 3)
-    if boxes.ndim != 3 or boxes.shape[1:] != (2, 3):
-        raise InputError(f"Expected boxes with shape (n_boxes, 2, 3), got {boxes.shape}.")
-    for number, (low, high) in enumerate(value):
-        what = f"a corner of box {number}"
-        _check_box(_vector(low, what), _vector(high, what), f"box {number}")
-    return boxes
-
-
-def _store_box(record: Any, low: str, high: str, what: str) -> None:
-    for key in (low, high):
-        _store(record, key, _vector(getattr(record, key), f"a corner of {what}"))
-    _check_box(getattr(record, low), getattr(record, high), what)
-
-
-def _check_box(low: FloatArray, high: FloatArray, what: str) -> None:
-    if not (low < high).all():
-        raise InputError(
-            f"Expected {what} with a low corner below its high corner along every axis, got {_text(low)} and "
-            f"{_text(high)}: it is inside out or has no thickness."
-        )
-
-
-def _check_keys(data: Any, what: str, known: tuple[str, ...], needed: tuple[str, ...]) -> None:
-    if not isinstance(data, dict):
-        raise InputError(f"Expected {what} as an object with {', '.join(needed)}, got {_kind(data)}.")
-    for key in needed:
-        if key not in data:
-            raise InputError(f"Expected {what} with '{key}', but it has none.")
-    for key in data:
-        if key not in known:
-            raise InputError(f"Unknown key {key!r} of {what}. Available: {', '.join(known)}.")
-
-
-def _list(data: Any, what: str) -> list[Any]:
-    if not isinstance(data, list):
-        raise InputError(f"Expected {what} as a list, got {_kind(data)}.")
-    return data
-
-
-def _corners(data: Any, what: str) -> list[FloatArray]:
-    _check_keys(data, what, ("low", "high"), ("low", "high"))
-    return [_vector(data[key], f"the {key} corner of {what}") for key in ("low", "high")]
-
-
-def _panel(data: Any, number: int) -> Panel:
-    what = f"panel {number}"
-    _check_keys(data, what, ("low", "high", "normal", "window"), ("low", "high", "normal", "window"))
-    low, high = _corners({"low": data["low"], "high": data["high"]}, what)
-    window = _corners(data["window"], f"the window of {what}")
-    try:
-        return Panel(low=low, high=high, normal=data["normal"], window_low=window[0], window_high=window[1])
-    except InputError as error:
-        raise InputError(f"{str(error).removesuffix('.')} ({what}).") from None
-
-
-def _kind(data: Any) -> str:
-    if isinstance(data, dict):
-        return f"an object of type {data['type']!r}" if "type" in data else "an object without a type"
-    return {list: "a list", str: "a text", type(None): "nothing"}.get(type(data), f"{data!r}")
-
-
-def _text(point: FloatArray) -> str:
-    return "(" + ", ".join(f"{value:g}" for value in point) + ")"

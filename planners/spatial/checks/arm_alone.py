@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from planners.checks.tolerances import ROUNDING, STEP_LIMIT
 from planners.problem import Fault
-from planners.spatial.checks.scene import PLACE_SLACK, ROUNDING, Scene, joint_fault, worst_of
+from planners.spatial.checks.scene import PLACE_SLACK, Scene, joint_fault, worst_of
 from planners.spatial.kinematics import joints_from_configuration
-
-STEP_LIMIT = 0.05
-"""Largest movement of a joint between two poses, in link lengths; as in the plane."""
 
 TURN_LIMIT = 1.0
 """Largest turn of a joint between two poses, in rad: with more, links could sweep about and come back."""

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from hrsnake_env.arm import FloatArray
+from planners.checks.tolerances import PINCH_TOLERANCE, ROUNDING
 from planners.problem import Fault, Progress
 from planners.spatial.checks.boxes import direction_gaps, frame_gaps, moving_gaps, separations
 from planners.spatial.checks.scene import (
     MAX_PIECES,
     MAX_SPLITS,
-    PINCH_TOLERANCE,
-    ROUNDING,
     BoolArray,
     IntArray,
     Moves,

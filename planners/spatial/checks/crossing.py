@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from hrsnake_env.arm import FloatArray
+from planners.checks.tolerances import ROUNDING
 from planners.problem import Fault, Progress
 from planners.spatial.checks.scene import (
     MAX_PIECES,
     MAX_SPLITS,
-    ROUNDING,
     IntArray,
     Scene,
     halves,

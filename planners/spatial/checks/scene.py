@@ -9,17 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrsnake_env.arm import FloatArray
+from planners.checks.tolerances import PINCH_TOLERANCE, ROUNDING
 from planners.problem import Fault
 from planners.spatial.checks.turning import third_derivatives
 from planners.spatial.kinematics import joints_from_configuration
 from planners.spatial.problem import SpatialMotion
 from planners.spatial.workspace import Workspace
-
-PINCH_TOLERANCE = 1e-3
-"""Largest depth of a link in an obstacle between two poses, in link lengths; as in the plane."""
-
-ROUNDING = 1e-9
-"""What counts as rounding, in link lengths."""
 
 PLACE_SLACK = 1e-6
 """How far joints may be from where configuration, feeder and start put them, in link lengths."""

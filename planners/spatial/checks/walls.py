@@ -7,9 +7,10 @@ import math
 import numpy as np
 
 from hrsnake_env.arm import FloatArray
+from planners.checks.tolerances import ROUNDING
 from planners.problem import Fault, Progress
 from planners.spatial.checks.boxes import axis_gaps, frame_gaps, separations
-from planners.spatial.checks.scene import ROUNDING, BoolArray, IntArray, Scene, point_of, slices
+from planners.spatial.checks.scene import BoolArray, IntArray, Scene, point_of, slices
 
 __all__ = ["check_poses", "nearest_of_each"]
 
