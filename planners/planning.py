@@ -14,6 +14,7 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners.baselines import BASELINES
 from planners.beam_planner import plan_as_printed, plan_beam
+from planners.checking import Checker, Late
 from planners.obstruction import wall_nearest_to
 from planners.portfolio import Question, first_questions, further_questions
 from planners.problem import (
@@ -24,7 +25,6 @@ from planners.problem import (
     PlanningResult,
     PlanningStatus,
     Progress,
-    ValidationReport,
 )
 from planners.query import Query
 from planners.rod_bound import Passage, rod_passes
@@ -111,7 +111,8 @@ def plan(
     if warm_start is not None:
         _check_warm_start(warm_start, maze, arm)
     deadline = time.perf_counter() + time_budget
-    checker = _Checker(maze, arm, deadline, progress)
+    bare = dataclasses.replace(arm, n_links=None)  # planners give as many links as the motion needs
+    checker = Checker[Motion](lambda motion, tell: validate(motion, maze, bare, tell), deadline, progress)
     query = Query(
         maze=maze,
         arm=arm,
@@ -144,7 +145,7 @@ def plan(
 class _Hearing:
     """Ask planners one after the other, and keep the record."""
 
-    def __init__(self, checker: _Checker) -> None:
+    def __init__(self, checker: Checker[Motion]) -> None:
         self.checker = checker
         self.attempts: list[Attempt] = []
         self.failures: list[PlanningResult] = []
@@ -196,42 +197,7 @@ def _depth(result: PlanningResult) -> float:
     return math.inf if depth is None else depth
 
 
-class _Late(Exception):
-    """Raised by the checker when time is over."""
-
-
-class _Checker:
-    """The exact checker for one query; remembers what it said last."""
-
-    def __init__(self, maze: Maze, arm: ArmSpec, deadline: float, progress: Progress | None) -> None:
-        # Planners give as many links as the motion needs.
-        self.maze, self.arm = maze, dataclasses.replace(arm, n_links=None)
-        self.deadline, self.progress = deadline, progress
-        self.last: tuple[Motion, ValidationReport] | None = None
-        self.refused: list[Motion] = []
-        self.seconds = 0.0
-
-    def __call__(self, motion: Motion) -> ValidationReport:
-        if self.last is not None and self.last[0] is motion:
-            return self.last[1]
-        start = time.perf_counter()
-        try:
-            report = validate(motion, self.maze, self.arm, self._tell)
-        finally:
-            self.seconds += time.perf_counter() - start
-        self.last = (motion, report)
-        if not report.valid:
-            self.refused.append(motion)
-        return report
-
-    def _tell(self, stage: str, share: float) -> None:
-        if time.perf_counter() > self.deadline:
-            raise _Late
-        if self.progress is not None:
-            self.progress(stage, share)
-
-
-def _answer(question: Question, checker: _Checker) -> PlanningResult:
+def _answer(question: Question, checker: Checker[Motion]) -> PlanningResult:
     """Ask one planner, and the checker about its motion."""
     name, _, query = question
     checker.seconds, motion = 0.0, None
@@ -247,7 +213,7 @@ def _answer(question: Question, checker: _Checker) -> PlanningResult:
             )
         motion = _with_wanted_links(candidate.motion, query.maze, query.arm)
         report = checker(motion)
-    except _Late:
+    except Late:
         return PlanningResult(
             status=PlanningStatus.OUT_OF_TIME,
             planner=name,

@@ -11,7 +11,8 @@ import numpy as np
 from hrsnake_env.arguments import is_number
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
-from planners.problem import Attempt, Failure, PlanningStatus, Progress, ValidationReport
+from planners.checking import Checker, Late
+from planners.problem import Attempt, Failure, PlanningStatus, Progress
 from planners.spatial.causal_planner import plan_causal
 from planners.spatial.following import plan_following
 from planners.spatial.problem import SpatialCandidate, SpatialMotion, SpatialResult
@@ -34,39 +35,6 @@ AUTO = ("track", "causal")
 
 TIME_BUDGET = 60.0
 """Seconds that planning may take by default."""
-
-
-class _Late(Exception):
-    """Raised by the checker when time is over."""
-
-
-class _Checker:
-    """The exact checker for one query; remembers what it said last."""
-
-    def __init__(
-        self, workspace: Workspace, arm: ArmSpec, deadline: float, progress: Progress | None
-    ) -> None:
-        self.workspace, self.arm = workspace, dataclasses.replace(arm, n_links=None)
-        self.deadline, self.progress = deadline, progress
-        self.last: tuple[SpatialMotion, ValidationReport] | None = None
-        self.seconds = 0.0
-
-    def __call__(self, motion: SpatialMotion) -> ValidationReport:
-        if self.last is not None and self.last[0] is motion:
-            return self.last[1]
-        start = time.perf_counter()
-        try:
-            report = validate(motion, self.workspace, self.arm, self._tell)
-        finally:
-            self.seconds += time.perf_counter() - start
-        self.last = (motion, report)
-        return report
-
-    def _tell(self, stage: str, share: float) -> None:
-        if time.perf_counter() > self.deadline:
-            raise _Late
-        if self.progress is not None:
-            self.progress(stage, share)
 
 
 def plan(
@@ -116,7 +84,10 @@ def plan(
     check_time_budget(time_budget)
     workspace.check_arm(arm)
     deadline = time.perf_counter() + time_budget
-    checker = _Checker(workspace, arm, deadline, progress)
+    bare = dataclasses.replace(arm, n_links=None)  # planners give as many links as the motion needs
+    checker = Checker[SpatialMotion](
+        lambda motion, tell: validate(motion, workspace, bare, tell), deadline, progress
+    )
     query = SpatialQuery(
         workspace=workspace,
         arm=arm,
@@ -166,7 +137,7 @@ def _warm(result: SpatialResult | None) -> tuple[np.ndarray, float] | None:
     return result.track, result.motion.link_length
 
 
-def _answer(name: str, query: SpatialQuery, checker: _Checker) -> SpatialResult:
+def _answer(name: str, query: SpatialQuery, checker: Checker[SpatialMotion]) -> SpatialResult:
     """Ask a planner, and the checker about its motion."""
     motion = None
     try:
@@ -181,7 +152,7 @@ def _answer(name: str, query: SpatialQuery, checker: _Checker) -> SpatialResult:
             )
         motion = _with_wanted_links(candidate.motion, query)
         report = checker(motion)
-    except _Late:
+    except Late:
         return SpatialResult(
             status=PlanningStatus.OUT_OF_TIME,
             planner=name,
