@@ -16,7 +16,7 @@ from planners.bench.tasks import Task, _rung
 
 TASK = Task(name="fake", shape="bend", problem=partial(_rung, "bend-i60", 340.0, 565.0), n_links=5)
 
-N_CELLS = 40
+N_CELLS = 120  # some seconds of work, so that no busy machine finishes before it is interrupted
 
 ONCE, ALWAYS, HANGS = 2, 3, 5
 """Seeds whose worker dies once, dies always, and does not come back."""
