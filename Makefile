@@ -29,6 +29,7 @@ docs-pictures: $(VENV)/.all
 ## kernels: the tests of the kernels once more as plain Python, where an index out of bounds is an error
 kernels: $(VENV)/.all
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest tests/test_kernels.py tests/test_beam_rules.py tests/test_geometry.py \
+		tests/test_spatial_track.py \
 		tests/test_planning.py::test_the_papers_links_pass_the_benchmark_without_penetration \
 		tests/test_sweep.py::test_every_vertex_is_one_link_length_from_its_start \
 		tests/test_rod_bound.py::test_a_small_maze_is_decided_in_plain_python_too \
