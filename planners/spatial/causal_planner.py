@@ -135,10 +135,8 @@ class _Growth:
         assert query.path is not None
         workspace, arm = query.workspace, query.arm
         self.length, self.horizon, self.margin = arm.link_length, horizon, MARGIN * arm.link_length
-        self.boxes = workspace.obstacles.copy()
-        self.swollen = workspace.obstacles + arm.link_radius * np.array([[-1.0], [1.0]])
-        self.boxes[:, 0] -= arm.link_radius + self.margin
-        self.boxes[:, 1] += arm.link_radius + self.margin
+        self.swollen = workspace.obstacles_grown(arm.link_radius)
+        self.boxes = workspace.obstacles_grown(arm.link_radius + self.margin)
         self.limit = math.pi if arm.joint_limit is None else STRICT * arm.joint_limit
         self.straight = workspace.straight
         self.path = behind_straight(workspace, query.path.points)

@@ -22,7 +22,7 @@ STOP = 0.5
 
 WINDOW, PASSES = 15, 3
 """Points on each side in the moving average, and how often it is taken. With wider windows the path comes
-near corners: in the paired panels links of 57.5 can follow it with 15, of 44 with 30 and of 20 with 40."""
+near corners, and links that follow it have to be shorter."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -37,8 +37,7 @@ LEVELS, OVERLAP = 390, 130
 """Steps from the goal solved at once, and how many of them once more with the next. From step to step u falls
 at most to a sixth, so in one piece by less than 1e304. Cutting u off behind the overlap changes it by 4e-5 at
 the overlap's beginning in a hall 80 cells wide and high, and by far less in narrower passages; but what comes
-round by a wider way that is longer by more than the overlap is missed there. The paired panels
-have 249 steps and are solved in one piece."""
+round by a wider way that is longer by more than the overlap is missed there."""
 
 SNAP = 1e-9
 """In cells: how near to a node a wall is on it."""

@@ -189,9 +189,7 @@ def candidate_along(query: SpatialQuery, curve: FloatArray) -> SpatialCandidate:
 def _shaped(query: SpatialQuery, effort: Effort) -> tuple[Track, float] | None:
     """Shape a track; return it with the depth that is left, or None if time runs out."""
     workspace, arm = query.workspace, query.arm
-    boxes = workspace.obstacles.copy()
-    boxes[:, 0] -= arm.link_radius + effort.margin * arm.link_length
-    boxes[:, 1] += arm.link_radius + effort.margin * arm.link_length
+    boxes = workspace.obstacles_grown(arm.link_radius + effort.margin * arm.link_length)
     limit = math.pi if arm.joint_limit is None else effort.strict * arm.joint_limit
     curve, first = query.start
     plan = [
@@ -222,8 +220,7 @@ def _shaped(query: SpatialQuery, effort: Effort) -> tuple[Track, float] | None:
 def _dead_end(query: SpatialQuery, track: Track) -> SpatialCandidate:
     """Say which chord is deepest in an obstacle."""
     length, units = query.arm.link_length, query.workspace.units
-    obstacles = query.workspace.obstacles
-    swollen = obstacles + query.arm.link_radius * np.array([[-1.0], [1.0]])
+    swollen = query.workspace.obstacles_grown(query.arm.link_radius)
     tip, rear, wall, depth = kernel.deepest_chord(track.points, track.fixed, length, swollen)
     links = f"links of {length:g} {units}"
     if query.arm.joint_limit is not None:

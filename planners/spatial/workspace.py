@@ -125,6 +125,10 @@ class Workspace:
         assert self.boxes is not None
         return np.concatenate([*(panel.boxes for panel in self.panels), self.boxes])
 
+    def obstacles_grown(self, margin: float) -> FloatArray:
+        """Return the obstacles with their faces moved outwards by a margin, shape (n, 2, 3)."""
+        return np.asarray(self.obstacles + margin * np.array([[-1.0], [1.0]]))
+
     def obstacle_in_room(self, number: int) -> FloatArray:
         """Return the part of an obstacle in the room, shape (2, 3), for people; of a side, its face."""
         return np.asarray(np.clip(self.obstacles[number], self.room_low, self.room_high))
