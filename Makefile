@@ -68,7 +68,7 @@ $(BIN)/python:
 
 # A stamp is newer than what it was made from, so a changed dependency installs again.
 $(VENV)/.core: $(INPUTS) | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable .
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[export,maps,studio]'
 	touch $@
 
 $(VENV)/.all: $(INPUTS) | $(BIN)/python
