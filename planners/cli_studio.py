@@ -21,18 +21,14 @@ MAX_JOBS, MAX_SECONDS = 64, 86_400.0
 def studio_command(
     maze: Annotated[
         str | None,
-        typer.Argument(
-            metavar="[MAZE]", help=f"To open with: a .geojson file, or one of: {', '.join(MAZES)}."
-        ),
+        typer.Argument(metavar="[MAZE]", help=f"To open: a .geojson file, or one of: {', '.join(MAZES)}."),
     ] = None,
     port: Annotated[int, typer.Option("--port", help="If it is taken, the next free one; 0 for any.")] = PORT,
     host: Annotated[
         str, typer.Option("--host", help="Address to listen on; by default this machine alone can connect.")
     ] = HOST,
     jobs: Annotated[int, typer.Option("--jobs", help="Plans at once, each in a process of its own.")] = 2,
-    no_browser: Annotated[
-        bool, typer.Option("--no-browser", help="Print the address, open nothing.")
-    ] = False,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
     time_limit: Annotated[
         float, typer.Option("--time-limit", help="Seconds that planning may be given, at most.")
     ] = 60.0,

@@ -12,7 +12,7 @@ from typing import Any
 
 from planners.studio.limits import Limits
 
-__all__ = ["Guard", "Refusal", "Shelf", "hosts_of", "read_body", "refusal_bytes"]
+__all__ = ["Guard", "Refusal", "Shelf", "hosts_of"]
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -157,10 +157,10 @@ def _check_content(headers: dict[str, list[str]], limits: Limits) -> None:
         raise Refusal(415, "Expected a request that is not compressed, got one that is.")
     for length in headers.get("content-length", []):
         if not (length.isascii() and length.isdigit()) or int(length[:20]) > limits.body_bytes:
-            raise too_large(limits)
+            raise _too_large(limits)
 
 
-def too_large(limits: Limits) -> Refusal:
+def _too_large(limits: Limits) -> Refusal:
     """Return the refusal of a body that is too large."""
     mib = limits.body_bytes / 2**20
     return Refusal(413, f"Expected a request of at most {mib:g} MiB, got a larger one.", "limit")
@@ -227,7 +227,7 @@ class Shelf:
 
     def _check(self, size: int) -> None:
         if size > self.limits.body_bytes:
-            raise too_large(self.limits)
+            raise _too_large(self.limits)
         if self.held > self.limits.held_bytes:
             raise Refusal(503, "The studio holds too many large requests: try again later.", "busy")
 

@@ -117,7 +117,7 @@ class Jobs:
     # Asked by the server
 
     def start(self) -> None:
-        """Start the first worker; the others follow when it is ready, as what it compiles serves them, too."""
+        """Start the first worker. When it is ready, so is compiled code for the others, which follow."""
         self._loop = asyncio.get_running_loop()
         self._replace(self.slots[0])
 
@@ -161,7 +161,7 @@ class Jobs:
                 self._replace(slot)
 
     def stop(self, job_id: str) -> bool:
-        """Ask a search to end with the best so far; cancel any other job. Return whether there is such a job."""
+        """Ask a search to end with the best so far, cancel any other job; return whether there is one."""
         for slot in self.slots:
             if slot.job is not None and slot.job.id == job_id:
                 if slot.job.kind == "longest":

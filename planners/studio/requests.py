@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import binascii
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import Field, ValidationError
 
@@ -33,6 +33,7 @@ Radius = Annotated[float, Field(allow_inf_nan=False, ge=0.0)]
 Degrees = Annotated[float, Field(allow_inf_nan=False, gt=0.0, le=180.0)]
 Seconds = Annotated[float, Field(allow_inf_nan=False, gt=0.0)]
 Positive = Annotated[float, Field(allow_inf_nan=False, gt=0.0)]
+Texts = Annotated[tuple[Text, ...], Field(max_length=200)]
 Data = str
 """Bytes in base64."""
 
@@ -90,7 +91,7 @@ class ExportRequest(Strict):
     format: Text
     runs: Annotated[list[Run], Field(min_length=1, max_length=2)]
     rate: Positive | None = None
-    limits: dict[Text, Positive | None] = {}
+    limits: dict[Text, Positive | None] | None = None
     metres_per_unit: Positive | None = None
 
 
@@ -111,11 +112,11 @@ class MapSettings(Strict):
     threshold: Number | None = None
     invert: bool = False
     unknown_is_free: bool = False
-    free: list[Text] = []
-    walls: list[Text] = []
-    base: list[Text] = []
-    goal: list[Text] = []
-    ignore: list[Text] = []
+    free: Texts = ()
+    walls: Texts = ()
+    base: Texts = ()
+    goal: Texts = ()
+    ignore: Texts = ()
     wall_thickness: Coordinate | None = None
 
 
@@ -126,7 +127,6 @@ class MapRequest(Strict):
     options: MapSettings = MapSettings()
 
 
-Kind = Literal["map", "plan", "check", "longest", "export"]
 Ask = MapRequest | PlanRequest | CheckRequest | LongestRequest | ExportRequest
 
 REQUESTS: dict[str, type[Ask]] = {

@@ -149,7 +149,8 @@ def _folded(free: Any, areas: list[Any], role: str) -> Any:
 def _area(shape: Shape, number: int) -> Any:
     if shape.line is not None:
         points = np.array(shape.line, dtype=np.float64).reshape(-1, 2)
-        kept = np.append(True, (np.diff(points, axis=0) != 0.0).any(axis=1)) if len(points) else []
+        kept = np.ones(len(points), dtype=bool)
+        kept[1:] = (np.diff(points, axis=0) != 0.0).any(axis=1)
         points = points[kept]
         if len(points) < 2:
             raise InputError(f"Expected a line of two different points or more in shape {number}, got fewer.")

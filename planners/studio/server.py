@@ -42,7 +42,7 @@ KINDS = {
 PLAYER = ("player.js", "player.css")
 
 FAMILY_LINK_LENGTH = 400.0
-"""For mazes that were made for no length of their own: two corridor widths, which all bends of 200 let pass."""
+"""For mazes that were made for no length of their own: two widths of their corridors."""
 
 SEED_DIGITS = 9
 
@@ -116,7 +116,7 @@ def studio_app(limits: Limits, host: str = "127.0.0.1", start: Maze | None = Non
 
 
 class _Answer(Response):
-    """Read a request, put it in the queue, and send its answer line by line; a closed connection cancels it."""
+    """Read a request, let it wait, and send its answer line by line; a closed connection cancels it."""
 
     def __init__(self, kind: str, jobs: Jobs, shelf: Shelf) -> None:
         super().__init__()

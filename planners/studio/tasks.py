@@ -45,7 +45,7 @@ MOTION_MEMBERS = 16
 
 
 def warm_up() -> None:
-    """Plan and simulate the paper's benchmark once: what is compiled or loaded, is so before the first job."""
+    """Plan and simulate the paper's benchmark once, so that the first job finds all compiled."""
     from planners.rollout import simulate_motion
 
     maze = Maze.load("fig19")
