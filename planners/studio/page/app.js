@@ -34,7 +34,7 @@ const runs = new Runs({ store, watch: (chosen) => watchRuns(chosen), changed: ()
 const watch = new Watch({ runs, fail });
 const exporter = new Exporter({ runs, scene: () => store.scene, arm: () => panel.arm(), fail, say });
 const maps = new MapDialog();
-const about = { planners: [], mazes: [], exports: [], map_endings: [], limits: {} };
+const about = { planners: [], mazes: [], exports: [], map_endings: [], limits: {}, start: null };
 
 let later = 0;
 function remember() {
@@ -276,8 +276,7 @@ async function start() {
     fail(error instanceof ApiError ? error.message : String(error));
   }
   if (old) panel.set(old.settings);
-  const wanted = new URLSearchParams(location.search).get("maze");
-  if (wanted) await openMaze(wanted);
+  if (about.start) await openMaze(about.start); // the one that the command line was given
   root.dataset.ready = "1";
 }
 function step(way) {
