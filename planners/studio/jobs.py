@@ -119,7 +119,8 @@ class Jobs:
     def start(self) -> None:
         """Start the first worker. When it is ready, so is compiled code for the others, which follow."""
         self._loop = asyncio.get_running_loop()
-        self._replace(self.slots[0])
+        for slot in self.slots[:1]:
+            self._replace(slot)
 
     async def close(self) -> None:
         """End all workers."""
