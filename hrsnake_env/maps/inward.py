@@ -108,7 +108,8 @@ def shrunk(old: FloatArray, begins: IntArray, tolerance: float) -> tuple[FloatAr
         nudge = NUDGE * np.abs(old).max()
         due, waits = np.empty(n, dtype=np.bool_), np.zeros(n, dtype=np.int64)
         sweep = 0
-        for level in LEVELS:
+        for stage in range(2 * len(LEVELS)):
+            level, covers = LEVELS[stage % len(LEVELS)], stage >= len(LEVELS)
             due[:] = True
             changed = True
             while changed:
@@ -118,7 +119,7 @@ def shrunk(old: FloatArray, begins: IntArray, tolerance: float) -> tuple[FloatAr
                     if walls.after[i] < 0 or not due[i] or waits[i] == sweep:
                         continue
                     due[i] = False
-                    done, entries = _cut(walls, grid, entries, i, level * tolerance, nudge)
+                    done, entries = _cut(walls, grid, entries, i, covers, level * tolerance, nudge)
                     if done:
                         changed = True
                         _wake(walls, due, waits, i, sweep)
@@ -184,21 +185,21 @@ def _turn(walls: Walls, i: int) -> float:
 
 @numba.njit(cache=True)
 def _cut(
-    walls: Walls, grid: Grid, entries: IntArray, i: int, limit: float, nudge: float
+    walls: Walls, grid: Grid, entries: IntArray, i: int, covers: bool, limit: float, nudge: float
 ) -> tuple[bool, IntArray]:
-    """Cut off vertex i, or cover the wall from it; tell whether that was possible."""
+    """Cut off vertex i, or cover the wall from it if `covers`; tell whether that was possible."""
     if walls.left[walls.ring[i]] <= 3:
         return False, entries
     now, foot, a, b = walls.now, walls.foot, walls.before[i], walls.after[i]
     turn = _turn(walls, i)
     if (
-        turn > 0.0
+        turn >= 0.0
         and _deviation(walls, foot[a], foot[b], now[a], now[b], limit) <= limit
         and _is_clear(walls, grid, entries, now[a], now[i], now[b], (a, i, i))
     ):
         _remove(walls, i)
         return True, _list(grid, entries, walls, a)
-    if turn == 0.0 or not (turn < 0.0 or _turn(walls, b) < 0.0):
+    if not covers or turn == 0.0 or not (turn < 0.0 or _turn(walls, b) < 0.0):
         return False, entries
     return _cover(walls, grid, entries, i, limit, nudge)
 
@@ -442,6 +443,19 @@ def _is_clear(
 
 
 @numba.njit(cache=True)
+def _goes_in(here: FloatArray, end: FloatArray, following: FloatArray, before: FloatArray) -> bool:
+    """Tell whether a line from a corner of a triangle goes into it or along it; the triangle may be flat."""
+    x, y = end[0] - here[0], end[1] - here[1]
+    fx, fy = following[0] - here[0], following[1] - here[1]
+    bx, by = before[0] - here[0], before[1] - here[1]
+    if _cross(fx, fy, bx, by) == 0.0 and fx * bx + fy * by < 0.0:
+        return True  # the middle of three in a row
+    if _cross(fx, fy, x, y) < 0.0 or _cross(x, y, bx, by) < 0.0:
+        return False
+    return x * fx + y * fy > 0.0 or x * bx + y * by > 0.0
+
+
+@numba.njit(cache=True)
 def _touches(d: FloatArray, e: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray) -> bool:
     """Tell whether the line from d to e touches a triangle (a to b to c turns left).
 
@@ -459,10 +473,7 @@ def _touches(d: FloatArray, e: FloatArray, a: FloatArray, b: FloatArray, c: Floa
         for m in range(2):
             start, end = (d, e) if m == 0 else (e, d)
             if start[0] == here[0] and start[1] == here[1]:
-                x, y = end[0] - start[0], end[1] - start[1]
-                off = _cross(following[0] - here[0], following[1] - here[1], x, y)
-                on = _cross(x, y, before[0] - here[0], before[1] - here[1])
-                return off >= 0.0 and on >= 0.0
+                return _goes_in(here, end, following, before)
     for k in range(3):
         here, following = (a, b) if k == 0 else ((b, c) if k == 1 else (c, a))
         x, y = following[0] - here[0], following[1] - here[1]
