@@ -1,73 +1,34 @@
 """Kernels that take vertices out of walls, so that walls move into the free space alone, and not far.
 
-Rings have the free space on the left. Two kinds of cuts are made, and each takes a triangle off the free space:
-a corner of the free space is cut off (its vertex is left out), and a short wall is covered by its neighbours,
-which are made longer until they meet. A cut is made only if its triangle touches no other wall, so walls never
-cross and passages stay open; and if the new walls are near the map's own. Each vertex has a foot on the map's
-own ring: the vertices between two feet are what a wall stands for, so deviations are measured, never added up.
+Rings have the free space on the left. Two kinds of cuts are made, and each takes a triangle off the free
+space: a corner of the free space is cut off (its vertex is left out), or a short wall is covered by its
+neighbours, which are made longer until they meet. A cut is made only if its triangle touches no other wall,
+so walls never cross and passages stay open; and if the new walls are near the map's own. Each vertex has a
+foot on the map's own ring: a wall stands for the vertices between its feet, so deviations are measured, never
+added up. Corners are cut off first, and walls covered then: the other way round, staircases would grow.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from hrsnake_env.arm import FloatArray
+from hrsnake_env.maps.cells import Grid, IntArray, Walls, cross, grid_of, is_clear, listed
 
 __all__ = ["shrunk"]
 
-IntArray = NDArray[np.int64]
-
 LEVELS = (0.25, 0.5, 1.0)
 """Cuts are made in this order, in shares of the tolerance: the least harmful first."""
-
-MAX_CELLS = 4_000_000
-"""Of the grid that finds walls."""
 
 NUDGE = 1e-14
 """In the size of the coordinates. New vertices are put this far into the free space, against rounding."""
 
 BLUNT = 0.05
 """Least square of the sum of two walls' normals: walls that meet in a sharper spike are not made longer."""
-
-
-class Walls(NamedTuple):
-    """Hold rings of vertices as they are now, and as they were."""
-
-    old: FloatArray
-    """The map's vertices, ring by ring, shape (n, 2)."""
-    now: FloatArray
-    """Where the vertices are now, shape (n, 2)."""
-    foot: FloatArray
-    """Number of the old vertex that each stands on, and how far it is on the way to the next, shape (n,)."""
-    before: IntArray
-    """The vertex before each, shape (n,)."""
-    after: IntArray
-    """The vertex after each, or -1 for those that are gone, shape (n,)."""
-    ring: IntArray
-    """The ring of each, shape (n,)."""
-    begins: IntArray
-    """Where each ring begins, shape (n_rings + 1,)."""
-    left: IntArray
-    """Vertices that are left in each ring, shape (n_rings,)."""
-
-
-class Grid(NamedTuple):
-    """Hold which walls are in which cells, as linked lists. Walls that are gone stay listed."""
-
-    x: float
-    y: float
-    cell: float
-    n_x: int
-    n_y: int
-    head: IntArray
-    """The first entry of each cell, or -1, shape (n_x * n_y,)."""
-    count: IntArray
-    """Entries in use, shape (1,)."""
 
 
 @numba.njit(cache=True)
@@ -100,11 +61,11 @@ def shrunk(old: FloatArray, begins: IntArray, tolerance: float) -> tuple[FloatAr
     walls = _walls(old, begins)
     _drop_straight(walls)
     if tolerance > 0.0:
-        grid = _grid(walls)
+        grid = grid_of(walls)
         entries = np.empty((4 * n + 1024, 3), dtype=np.int64)
         for i in range(n):
             if walls.after[i] >= 0:
-                entries = _list(grid, entries, walls, i)
+                entries = listed(grid, entries, walls, i)
         nudge = NUDGE * np.abs(old).max()
         due, waits = np.empty(n, dtype=np.bool_), np.zeros(n, dtype=np.int64)
         sweep = 0
@@ -172,15 +133,10 @@ def _wake(walls: Walls, due: NDArray[np.bool_], waits: IntArray, i: int, sweep: 
 
 
 @numba.njit(cache=True)
-def _cross(ax: float, ay: float, bx: float, by: float) -> float:
-    return ax * by - ay * bx
-
-
-@numba.njit(cache=True)
 def _turn(walls: Walls, i: int) -> float:
     """Return a positive number where the walls turn left: at a corner of the free space."""
     a, b, now = walls.before[i], walls.after[i], walls.now
-    return _cross(now[i, 0] - now[a, 0], now[i, 1] - now[a, 1], now[b, 0] - now[i, 0], now[b, 1] - now[i, 1])
+    return cross(now[i, 0] - now[a, 0], now[i, 1] - now[a, 1], now[b, 0] - now[i, 0], now[b, 1] - now[i, 1])
 
 
 @numba.njit(cache=True)
@@ -195,10 +151,10 @@ def _cut(
     if (
         turn >= 0.0
         and _deviation(walls, foot[a], foot[b], now[a], now[b], limit) <= limit
-        and _is_clear(walls, grid, entries, now[a], now[i], now[b], (a, i, i))
+        and is_clear(walls, grid, entries, now[a], now[i], now[b], (a, i, i))
     ):
         _remove(walls, i)
-        return True, _list(grid, entries, walls, a)
+        return True, listed(grid, entries, walls, a)
     if not covers or turn == 0.0 or not (turn < 0.0 or _turn(walls, b) < 0.0):
         return False, entries
     return _cover(walls, grid, entries, i, limit, nudge)
@@ -219,30 +175,30 @@ def _cover(
         gap > limit
         or _deviation(walls, foot[o], t, now[o], x, limit) > limit
         or _deviation(walls, t, foot[r], x, now[r], limit) > limit
-        or not _is_clear(walls, grid, entries, now[p], now[q], x, (o, p, q))
+        or not is_clear(walls, grid, entries, now[p], now[q], x, (o, p, q))
     ):
         return False, entries
     now[p] = x
     foot[p] = t
     _remove(walls, q)
-    entries = _list(grid, entries, walls, o)
-    return True, _list(grid, entries, walls, p)
+    entries = listed(grid, entries, walls, o)
+    return True, listed(grid, entries, walls, p)
 
 
 @numba.njit(cache=True)
 def _apex(walls: Walls, p: int, nudge: float) -> tuple[FloatArray, float, float]:
-    """Return where the neighbours of the wall from p meet in the free space, and between which feet it may be."""
+    """Return where the neighbours of the wall from p meet, and between which feet the new foot may be."""
     now, foot, q = walls.now, walls.foot, walls.after[p]
     o, r = walls.before[p], walls.after[q]
     ux, uy = now[p, 0] - now[o, 0], now[p, 1] - now[o, 1]
     wx, wy = now[r, 0] - now[q, 0], now[r, 1] - now[q, 1]
     ex, ey = now[q, 0] - now[p, 0], now[q, 1] - now[p, 1]
     x, nowhere = np.zeros(2), (0.0, 0.0)
-    both = _cross(ux, uy, wx, wy)
+    both = cross(ux, uy, wx, wy)
     u, w = math.hypot(ux, uy), math.hypot(wx, wy)
     if abs(both) <= 1e-9 * u * w:
         return x, *nowhere
-    along_u, along_w = _cross(ex, ey, wx, wy) / both, _cross(ex, ey, ux, uy) / both
+    along_u, along_w = cross(ex, ey, wx, wy) / both, cross(ex, ey, ux, uy) / both
     at_p, at_q = _turn(walls, p), _turn(walls, q)
     low, high = foot[p], foot[q]
     if at_p < 0.0 and at_q < 0.0:
@@ -284,9 +240,7 @@ def _ring_at(walls: Walls, foot: float) -> int:
 
 
 @numba.njit(cache=True)
-def _deviation(
-    walls: Walls, start: float, end: float, a: FloatArray, b: FloatArray, limit: float
-) -> float:
+def _deviation(walls: Walls, start: float, end: float, a: FloatArray, b: FloatArray, limit: float) -> float:
     """Return the largest distance of the old vertices between two feet from the wall from a to b.
 
     Stops at the first that is over the limit.
@@ -341,9 +295,7 @@ def _moved(walls: Walls) -> float:
         if walls.after[i] < 0:
             continue
         foot, b = walls.foot[i], walls.after[i]
-        worst = max(
-            worst, _deviation(walls, foot, walls.foot[b], walls.now[i], walls.now[b], math.inf)
-        )
+        worst = max(worst, _deviation(walls, foot, walls.foot[b], walls.now[i], walls.now[b], math.inf))
         if walls.now[i, 0] != walls.old[i, 0] or walls.now[i, 1] != walls.old[i, 1]:
             ax, ay = _old(walls, walls.ring[i], math.floor(foot))
             bx, by = _old(walls, walls.ring[i], math.floor(foot) + 1)
@@ -353,139 +305,3 @@ def _moved(walls: Walls) -> float:
             )
             worst = max(worst, gap)
     return worst
-
-
-# Finding walls in a triangle
-
-
-@numba.njit(cache=True)
-def _grid(walls: Walls) -> Grid:
-    x, y = walls.old[:, 0].min(), walls.old[:, 1].min()
-    wide, high = walls.old[:, 0].max() - x, walls.old[:, 1].max() - y
-    n = min(walls.left.sum(), MAX_CELLS // 2)
-    cell = max(math.sqrt(wide * high / n), max(wide, high) / n)
-    n_x, n_y = int(wide / cell) + 1, int(high / cell) + 1
-    return Grid(x, y, cell, n_x, n_y, np.full(n_x * n_y, -1, dtype=np.int64), np.zeros(1, dtype=np.int64))
-
-
-@numba.njit(cache=True)
-def _row(grid: Grid, y: float) -> int:
-    return min(max(int((y - grid.y) / grid.cell), 0), grid.n_y - 1)
-
-
-@numba.njit(cache=True)
-def _columns(grid: Grid, row: int, a: FloatArray, b: FloatArray, c: FloatArray) -> tuple[int, int]:
-    """Return the first and the last column in which a triangle, or a line (b is c), reaches a row."""
-    margin = 1e-6 * grid.cell
-    low, high = grid.y + row * grid.cell - margin, grid.y + (row + 1) * grid.cell + margin
-    if row == 0:
-        low = -math.inf
-    if row == grid.n_y - 1:
-        high = math.inf
-    least, most = math.inf, -math.inf
-    for k in range(3):
-        start, end = (a, b) if k == 0 else ((b, c) if k == 1 else (c, a))
-        if max(start[1], end[1]) < low or min(start[1], end[1]) > high:
-            continue
-        for y in (low, high):
-            if min(start[1], end[1]) < y < max(start[1], end[1]):
-                x = start[0] + (y - start[1]) / (end[1] - start[1]) * (end[0] - start[0])
-                least, most = min(least, x), max(most, x)
-        for point in (start, end):
-            if low <= point[1] <= high:
-                least, most = min(least, point[0]), max(most, point[0])
-    first, last = (least - margin - grid.x) / grid.cell, (most + margin - grid.x) / grid.cell
-    return int(min(max(first, 0.0), grid.n_x - 1.0)), int(min(max(last, 0.0), grid.n_x - 1.0))
-
-
-@numba.njit(cache=True)
-def _list(grid: Grid, entries: IntArray, walls: Walls, i: int) -> IntArray:
-    """List the wall from vertex i in all cells that it comes into. An entry is start, end, next entry."""
-    j = walls.after[i]
-    a, b = walls.now[i], walls.now[j]
-    for row in range(_row(grid, min(a[1], b[1])), _row(grid, max(a[1], b[1])) + 1):
-        first, last = _columns(grid, row, a, b, b)
-        for column in range(first, last + 1):
-            n, cell = grid.count[0], row * grid.n_x + column
-            if n == len(entries):
-                entries = np.concatenate((entries, np.empty_like(entries)))
-            entries[n, 0], entries[n, 1], entries[n, 2] = i, j, grid.head[cell]
-            grid.head[cell] = n
-            grid.count[0] = n + 1
-    return entries
-
-
-@numba.njit(cache=True)
-def _is_clear(
-    walls: Walls,
-    grid: Grid,
-    entries: IntArray,
-    a: FloatArray,
-    b: FloatArray,
-    c: FloatArray,
-    own: tuple[int, int, int],
-) -> bool:
-    """Tell whether no wall but those that begin at `own` is in a triangle, or touches it but at its corners."""
-    if _cross(b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]) < 0.0:
-        b, c = c, b
-    for row in range(_row(grid, min(a[1], b[1], c[1])), _row(grid, max(a[1], b[1], c[1])) + 1):
-        first, last = _columns(grid, row, a, b, c)
-        for column in range(first, last + 1):
-            entry = grid.head[row * grid.n_x + column]
-            while entry >= 0:
-                i, j = entries[entry, 0], entries[entry, 1]
-                entry = entries[entry, 2]
-                if walls.after[i] != j or i == own[0] or i == own[1] or i == own[2]:
-                    continue
-                if _touches(walls.now[i], walls.now[j], a, b, c):
-                    return False
-    return True
-
-
-@numba.njit(cache=True)
-def _goes_in(here: FloatArray, end: FloatArray, following: FloatArray, before: FloatArray) -> bool:
-    """Tell whether a line from a corner of a triangle goes into it or along it; the triangle may be flat."""
-    x, y = end[0] - here[0], end[1] - here[1]
-    fx, fy = following[0] - here[0], following[1] - here[1]
-    bx, by = before[0] - here[0], before[1] - here[1]
-    if _cross(fx, fy, bx, by) == 0.0 and fx * bx + fy * by < 0.0:
-        return True  # the middle of three in a row
-    if _cross(fx, fy, x, y) < 0.0 or _cross(x, y, bx, by) < 0.0:
-        return False
-    return x * fx + y * fy > 0.0 or x * bx + y * by > 0.0
-
-
-@numba.njit(cache=True)
-def _touches(d: FloatArray, e: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray) -> bool:
-    """Tell whether the line from d to e touches a triangle (a to b to c turns left).
-
-    A line that begins or ends at a corner does not, unless it goes on into the triangle or along its side.
-    """
-    if (
-        max(d[0], e[0]) < min(a[0], b[0], c[0])
-        or min(d[0], e[0]) > max(a[0], b[0], c[0])
-        or max(d[1], e[1]) < min(a[1], b[1], c[1])
-        or min(d[1], e[1]) > max(a[1], b[1], c[1])
-    ):
-        return False
-    for k in range(3):
-        here, following, before = (a, b, c) if k == 0 else ((b, c, a) if k == 1 else (c, a, b))
-        for m in range(2):
-            start, end = (d, e) if m == 0 else (e, d)
-            if start[0] == here[0] and start[1] == here[1]:
-                return _goes_in(here, end, following, before)
-    for k in range(3):
-        here, following = (a, b) if k == 0 else ((b, c) if k == 1 else (c, a))
-        x, y = following[0] - here[0], following[1] - here[1]
-        if (
-            _cross(x, y, d[0] - here[0], d[1] - here[1]) < 0.0
-            and _cross(x, y, e[0] - here[0], e[1] - here[1]) < 0.0
-        ):
-            return False
-    x, y = e[0] - d[0], e[1] - d[1]
-    sides = (
-        _cross(x, y, a[0] - d[0], a[1] - d[1]),
-        _cross(x, y, b[0] - d[0], b[1] - d[1]),
-        _cross(x, y, c[0] - d[0], c[1] - d[1]),
-    )
-    return not (min(sides) > 0.0 or max(sides) < 0.0)

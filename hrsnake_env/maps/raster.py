@@ -71,7 +71,7 @@ def free_polygons(free: ArrayLike) -> Polygon | MultiPolygon:
 def _is_free(free: NDArray[np.bool_], row: int, column: int) -> bool:
     """Tell whether a pixel is free; there is none outside the image."""
     rows, columns = free.shape
-    return 0 <= row < rows and 0 <= column < columns and free[row, column]
+    return 0 <= row < rows and 0 <= column < columns and bool(free[row, column])
 
 
 @numba.njit(cache=True)

@@ -20,9 +20,10 @@ def simplified_inward(
 ) -> tuple[Polygon | MultiPolygon, float]:
     """Take vertices out of an outline by moving its walls into the free space, not far.
 
-    The result lies within the polygon, and has its parts and holes: passages become narrower by at most twice
-    the tolerance, but none is closed, and no obstacle is lost. Staircases of pixels along a slanted wall become
-    one straight wall if the tolerance is their depth: 0.71 pixels at 45 degrees, and at most 1.42 at any angle.
+    The result lies within the polygon, and has its parts and holes: passages become narrower by at most
+    twice the tolerance, but none is closed, and no obstacle is lost. Staircases of pixels along a slanted
+    wall become one straight wall if the tolerance is their depth: 0.71 pixels at 45 degrees, and at most 1.42
+    at any angle.
 
     Parameters
     ----------
