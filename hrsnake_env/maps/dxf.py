@@ -56,9 +56,9 @@ def read_dxf(name: str, files: MapFiles, options: MapOptions) -> MapReading:
         raise InputError(f"Expected at most {MAX_BYTES >> 20} MiB in '{name}', got more.")
     document, notes = _document(data, name)
     units = UNITS.get(int(document.header.get("$INSUNITS", 0) or 0))
-    notes.insert(0, f"DXF drawing in {units or 'units that it does not name'}.")
     reader = _Reader(document, name)
     outlines = list(reader.outlines())
+    notes.insert(0, f"DXF drawing of {counted(len(outlines), 'outline')}.")
     notes += reader.notes()
     return read_outlines(
         Drawing(name=PurePath(name).stem, outlines=outlines, units=units, notes=notes), options

@@ -197,13 +197,14 @@ def spline_pieces(
     if not (w > 0.0).all() or (np.diff(t) < 0.0).any():
         raise InputError("Expected a spline with positive weights and rising knots, got another one.")
     lifted = np.column_stack([points * w[:, None], w])
-    polynomials = PPoly.from_spline(BSpline(t, lifted, degree))
-    inside = slice(degree, len(points))  # the spans on which the spline is defined
-    bernstein = BPoly.from_power_basis(polynomials).c[:, inside]  # (degree + 1, n_spans, 3)
+    breaks = np.unique(t[degree : len(points) + 1])  # where the spline is defined
+    if len(breaks) < 2:
+        raise InputError("Expected a spline with rising knots, got all of them the same.")
+    curve = BSpline(t, lifted, degree)
+    powers = [curve(breaks[:-1], nu=k) / math.factorial(k) for k in range(degree, -1, -1)]
+    bernstein = BPoly.from_power_basis(PPoly(np.array(powers), breaks)).c  # (degree + 1, n_spans, 3)
     return [
-        Bezier(control=span[:, :2] / span[:, 2:], weights=span[:, 2])
-        for span, width in zip(bernstein.transpose(1, 0, 2), np.diff(t)[inside], strict=True)
-        if width > 0.0
+        Bezier(control=span[:, :2] / span[:, 2:], weights=span[:, 2]) for span in bernstein.transpose(1, 0, 2)
     ]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
 import shapely
@@ -19,7 +20,7 @@ __all__ = ["free_space_of"]
 MITRE_LIMIT = 10.0
 """Corners of thick walls sharper than about 11 degrees are cut off."""
 
-Area = Polygon | MultiPolygon
+Area: TypeAlias = "Polygon | MultiPolygon"
 
 
 def free_space_of(
@@ -110,7 +111,7 @@ def _floor_plan(
         notes.append(f"{counted(n_twice, 'outline')} drawn twice left out.")
     if n_cross:
         notes.append(
-            f"{counted(n_cross, 'outline')} crossing larger ones taken as obstacles: name what is free to join."
+            f"{counted(n_cross, 'outline')} crossing larger ones are obstacles: name free what is to join."
         )
     return shapely.difference(plan.free_space, material)
 

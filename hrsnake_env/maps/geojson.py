@@ -195,7 +195,7 @@ def _number(value: Any) -> float | None:
 
 
 def _like_degrees(outlines: list[Outline]) -> bool:
-    """Are these numbers within a degree of each other, far from the origin, and on the globe?"""
+    """Tell whether numbers are within a degree of each other, far from the origin, and on the globe."""
     points = np.concatenate([outline.hull for outline in outlines])
     extent = float(np.ptp(points, axis=0).max())
     near = np.abs(points).max(axis=0)

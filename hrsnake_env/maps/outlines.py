@@ -17,6 +17,7 @@ rest of the tolerance is for leaving out corners.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TypeAlias
 
 import numpy as np
 import shapely
@@ -47,7 +48,7 @@ MAX_VERTICES = 200_000
 THINNEST = 1e-9
 """Parts of the free space thinner than this share of its size are rounding, not rooms."""
 
-Area = Polygon | MultiPolygon
+Area: TypeAlias = "Polygon | MultiPolygon"
 Found = tuple[FloatArray | None, float | None, str | None]
 
 
@@ -162,6 +163,6 @@ def _check_vertices(free: Area, name: str) -> None:
 
 def _nothing_free(name: str, n_closed: int, n_open: int) -> str:
     return (
-        f"Expected closed outlines around free space in map '{name}', got {n_closed} closed and {n_open} open "
-        f"lines: name what is free, or give open lines a wall thickness."
+        f"Expected closed outlines around free space in map '{name}', got {n_closed} closed and {n_open} "
+        f"open lines: name what is free, or give open lines a wall thickness."
     )

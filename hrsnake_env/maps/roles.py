@@ -50,7 +50,8 @@ def roles_of(outlines: Sequence[Outline], options: MapOptions) -> Roles:
     """Give outlines their roles.
 
     A layer or colour that an option names has that role. A role that no option is given for falls to layers
-    whose names have a word of `SPEAKING`. If options say what is free, all that has no role is ignored. The most specific name counts: a shape's own before its layer's.
+    whose names have a word of `SPEAKING`. If options say what is free, all that has no role is ignored. The
+    most specific name counts: a shape's own before its layer's.
 
     Raises
     ------

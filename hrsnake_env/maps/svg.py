@@ -36,12 +36,12 @@ LINKS = ("href", "{http://www.w3.org/1999/xlink}href")
 LENGTH = re.compile(r"\s*([0-9.]+(?:[eE][-+]?\d+)?)\s*(mm|cm|in|pt|pc|px|q|)\s*", re.IGNORECASE)
 IN_MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6, "q": 0.25}
 
-NOT_DRAWN = frozenset(
-    "text image foreignObject script metadata title desc marker mask clipPath pattern linearGradient "
-    "radialGradient filter namedview animate animateTransform animateMotion set video audio iframe".split()
-)
 SAID = ("text", "image", "foreignObject")
 """Left out, and worth a word."""
+
+NOT_DRAWN = {*SAID, "script", "metadata", "title", "desc", "namedview"}
+NOT_DRAWN |= {"marker", "mask", "clipPath", "pattern", "linearGradient", "radialGradient", "filter"}
+NOT_DRAWN |= {"animate", "animateTransform", "animateMotion", "set", "video", "audio", "iframe"}
 
 
 def read_svg(name: str, files: MapFiles, options: MapOptions) -> MapReading:
@@ -63,8 +63,7 @@ def read_svg(name: str, files: MapFiles, options: MapOptions) -> MapReading:
         raise InputError("Expected svgelements for SVG drawings: pip install 'hrsnake[maps]'.") from None
     root = _checked_tree(_plain(files(name), name), name)
     to_page, height, units = _page(root, name)
-    notes = [f"SVG drawing in {units}."]
-    notes += _prepare(root)
+    notes = _prepare(root)
     _check_uses(root, name)
     for key in ("width", "height"):
         root.attrib.pop(key, None)  # the page's size is ours: the library's mm are 1 in 2 million off
@@ -75,6 +74,7 @@ def read_svg(name: str, files: MapFiles, options: MapOptions) -> MapReading:
         raise InputError(f"Expected shapes that can be read in '{name}', got broken ones.") from None
     except RecursionError:
         raise InputError(f"Expected groups at most {MAX_DEPTH} deep in '{name}', got more.") from None
+    notes.insert(0, f"SVG drawing of {counted(len(outlines), 'shape')}.")
     return read_outlines(
         Drawing(name=PurePath(name).stem, outlines=outlines, units=units, notes=notes), options
     )

@@ -127,7 +127,7 @@ def traced(
 
 
 def _encloses(stroke: Stroke, points: FloatArray, gap: float) -> bool:
-    """Is this line closed, or all but closed, around some area?"""
+    """Tell whether a line is closed, or all but closed, around some area."""
     if len(points) < 3 or MultiPoint(points).convex_hull.area <= 0.0:
         return False
     near = float(np.linalg.norm(points[0] - points[-1])) <= gap
