@@ -315,6 +315,11 @@ def test_a_body_is_refused_by_its_length_before_it_is_read(strict: Studio) -> No
         assert b" 413 " in sock.recv(4096)
 
 
+def test_a_client_that_sends_too_much_before_it_listens_hears_why(strict: Studio) -> None:
+    status, (answer,) = strict.post("/api/plan", b" " * 30_000)
+    assert status == 413 and "at most" in answer["message"]
+
+
 def test_a_body_without_a_length_is_refused_when_it_has_become_too_large(strict: Studio) -> None:
     with socket.create_connection(("127.0.0.1", strict.port)) as sock:
         head = "POST /api/plan HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
@@ -548,6 +553,57 @@ def test_jobs_wait_in_order_and_those_that_cannot_are_refused(strict: Studio) ->
     third.close()
     _drop(second)
     strict.wait(lambda: not strict.jobs.waiting)
+
+
+# Maps
+
+PGM = b"P5\n6 5\n255\n" + bytes(6) + 3 * (b"\0" + 4 * b"\xff" + b"\0") + bytes(6)
+YAML = (
+    b"image: {}\nresolution: 0.5\norigin: [1.0, 2.0, 0.0]\nnegate: 0\n"
+    b"occupied_thresh: 0.65\nfree_thresh: 0.2\n"
+)
+
+
+def _files(**files: bytes) -> list[dict[str, str]]:
+    return [{"name": name, "data": base64.b64encode(data).decode()} for name, data in files.items()]
+
+
+@pytest.mark.parametrize("image", [b"map.pgm", b"/home/me/maps/map.pgm"])
+def test_a_map_of_two_files_is_read_from_what_was_sent(studio: Studio, image: bytes) -> None:
+    files = _files(**{"map.pgm": PGM, "map.yaml": YAML.replace(b"{}", image)})
+    result = _last(studio.post("/api/map", {"files": files})[1])
+    (shape,) = result["scene"]["shapes"]
+    xs, ys = zip(*shape["rings"][0], strict=True)
+    assert (min(xs), max(xs), min(ys), max(ys)) == pytest.approx((1.5, 3.5, 2.5, 4.0))
+    assert (result["units"], result["parts"], result["scene"]["base"]) == ("m", 1, None)
+    assert result["notes"]
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "sentence"),
+    [
+        ("map.yaml", YAML.replace(b"{}", b"../../../../etc/passwd"), "among the files"),
+        ("map.yaml", YAML.replace(b"{}", b"/etc/passwd"), "among the files"),
+        ("map.png", b"no picture", "Expected"),
+        ("map.svg", b"<svg", "Expected"),
+        ("map.dxf", b"0\nSECTION", "Expected"),
+        ("/etc/passwd", b"", "Unknown kind of map 'passwd'"),
+        ("map.geojson", b"{", "Expected"),
+    ],
+)
+def test_a_map_that_cannot_be_read_gets_a_sentence(
+    studio: Studio, name: str, data: bytes, sentence: str
+) -> None:
+    status, lines = studio.post("/api/map", {"files": _files(**{name: data})})
+    assert status == 200 and (lines[-1]["type"], lines[-1]["kind"]) == ("error", "input")
+    assert sentence in lines[-1]["message"] and "root:" not in lines[-1]["message"]
+
+
+def test_an_unknown_option_of_maps_is_refused(studio: Studio) -> None:
+    ask = {"files": _files(**{"map.pgm": PGM}), "options": {"colour": "red"}}
+    assert studio.post("/api/map", ask)[0] == 422
+    assert studio.post("/api/map", {"files": _files(**{f"{k}.pgm": PGM for k in range(9)})})[0] == 422
+    assert studio.post("/api/map", {"files": []})[0] == 422
 
 
 # Motions that were sent

@@ -44,8 +44,6 @@ OWN_EXPORTS: dict[str, tuple[str, str]] = {
 }
 """What the studio writes itself: ending, and what it is."""
 
-DEGREES = "_deg"
-
 
 # Maps
 
@@ -62,13 +60,12 @@ def map_read(ask: MapRequest) -> dict[str, Any]:
 
     settings = {key: value for key, value in ask.options.model_dump().items() if value is not None}
     reading = read_map(_main_file(ask.files), MapOptions(**settings), uploaded(ask.files))
-    n_points = sum(
-        len(ring.coords) - 1 for part in reading.parts for ring in (part.exterior, *part.interiors)
-    )
+    rings = [ring for part in reading.parts for ring in (part.exterior, *part.interiors)]
+    n_points = sum(len(ring.coords) - 1 for ring in rings)
     if n_points > MAX_POINTS:
         raise InputError(
-            f"Expected a map of at most {MAX_POINTS} corners, got {n_points}: a larger tolerance, or an image "
-            f"with less noise, has fewer."
+            f"Expected a map of at most {MAX_POINTS} corners, got {n_points}: a larger tolerance, or an "
+            f"image with less noise, has fewer."
         )
     return {
         "scene": _scene_of(reading),
@@ -82,12 +79,12 @@ def map_read(ask: MapRequest) -> dict[str, Any]:
 
 
 def uploaded(files: Sequence[UploadedFile]) -> MapFiles:
-    """Return what reads the files that were uploaded, by their names without folders, and nothing else."""
+    """Return what reads the files that were uploaded, by their names without folders; nothing else."""
     held = {_base_name(file.name): file for file in files}
 
     def read(name: str) -> bytes:
         file = held.get(name) or held.get(_base_name(name))
-        if file is None or ".." in re.split(r"[/\\]", name):
+        if file is None:
             wanted, got = _base_name(name)[:80], ", ".join(held)
             raise InputError(f"Expected '{wanted}' among the files, got {got}: choose all together.")
         return decoded(file.data, f"file '{file.name}'")
@@ -199,17 +196,16 @@ def _page(runs: list[Run], progress: Progress) -> bytes:
 
 
 def _limits(limits: dict[str, float | None]) -> TrajectoryLimits:
-    """Return limits by name; names that end in _deg stand for degrees."""
+    """Return limits by name, in rad and maze units."""
     from planners.export import TrajectoryLimits
 
     known = [field.name for field in fields(TrajectoryLimits)]
     values = {}
     for key, value in limits.items():
-        name = key.removesuffix(DEGREES)
-        if name not in known:
+        if key not in known:
             raise InputError(f"Unknown limit {key[:40]!r}. Available: {', '.join(known)}.")
         if value is not None:
-            values[name] = math.radians(value) if key.endswith(DEGREES) else value
+            values[key] = value
     return TrajectoryLimits(**values)
 
 
