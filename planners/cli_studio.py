@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import sys
 from typing import Annotated
+from urllib.parse import quote
 
 import typer
 
@@ -42,7 +43,7 @@ def studio_command(
     listener = listening_socket(host, port)
     bound = listener.getsockname()[1]
     shown = "127.0.0.1" if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host.strip("[]") else host
-    url = f"http://{shown}:{bound}/"
+    url = f"http://{shown}:{bound}/" + ("" if start is None else f"?maze={quote(start.name)}")
 
     def ready() -> None:
         if port not in (0, bound):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import ipaddress
 import json
 import socket
@@ -12,7 +13,7 @@ from typing import Any
 
 from planners.studio.limits import Limits
 
-__all__ = ["Guard", "Refusal", "Shelf", "hosts_of"]
+__all__ = ["Guard", "Refusal", "Shelf", "hosts_of", "refuse"]
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -21,6 +22,9 @@ App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 ANY_ADDRESS = ("0.0.0.0", "::", "")
+
+DRAIN_S = 0.25
+"""Seconds for which a client that is refused may pause in what it sends."""
 
 HEADERS = {
     "content-security-policy": (
@@ -101,7 +105,7 @@ class Guard:
             self._check(scope)
             await self.app(scope, receive, guarded)
         except Refusal as refusal:
-            await _refuse(refusal, guarded)
+            await refuse(refusal, receive, guarded, self.limits)
         finally:
             self.n_open -= 1
 
@@ -179,11 +183,23 @@ def _with_headers(send: Send) -> Send:
     return guarded
 
 
-async def _refuse(refusal: Refusal, send: Send) -> None:
-    """Answer with a refusal, and close the connection: the rest of the body is not read."""
+async def refuse(refusal: Refusal, receive: Receive, send: Send, limits: Limits) -> None:
+    """Answer with a refusal, and close the connection."""
+    await _drain(receive, limits)
     headers = [(b"content-type", b"application/json"), (b"connection", b"close")]
     await send({"type": "http.response.start", "status": refusal.status, "headers": headers})
     await send({"type": "http.response.body", "body": json.dumps(refusal.to_dict()).encode()})
+
+
+async def _drain(receive: Receive, limits: Limits) -> None:
+    """Let go by what a client sends while it sends, within limits: many hear an answer only after that."""
+    left = limits.body_bytes
+    with contextlib.suppress(TimeoutError):
+        while left > 0:
+            message = await asyncio.wait_for(receive(), DRAIN_S)
+            left -= len(message.get("body", b""))
+            if not message.get("more_body", False):
+                return
 
 
 class Shelf:

@@ -119,7 +119,8 @@ class Jobs:
     def start(self) -> None:
         """Start the first worker. When it is ready, so is compiled code for the others, which follow."""
         self._loop = asyncio.get_running_loop()
-        self._replace(self.slots[0])
+        for slot in self.slots[:1]:
+            self._replace(slot)
 
     async def close(self) -> None:
         """End all workers."""
@@ -127,11 +128,14 @@ class Jobs:
         for job in [*self.waiting, *(slot.job for slot in self.slots if slot.job is not None)]:
             job.end(error_line("internal", "The studio was closed."))
         self.waiting.clear()
+        await self._kill_all()
         if self._tasks:
             await asyncio.wait(self._tasks)
-        await asyncio.gather(
-            *(asyncio.to_thread(slot.worker.kill) for slot in self.slots if slot.worker is not None)
-        )
+        await self._kill_all()  # those that were only just started, too
+
+    async def _kill_all(self) -> None:
+        workers = [slot.worker for slot in self.slots if slot.worker is not None]
+        await asyncio.gather(*(asyncio.to_thread(worker.kill) for worker in workers))
 
     def submit(self, kind: str, body: bytes, time_limit: float) -> Job:
         """Put a job at the end of the queue.

@@ -49,8 +49,8 @@ class Limits:
     time_budget_s: float = 60.0
     grace_s: float = 30.0
     longest_s: float = 900.0
-    body_bytes: int = 48 * MIB
-    held_bytes: int = 256 * MIB
+    body_bytes: int = 32 * MIB
+    held_bytes: int = 160 * MIB
     body_tokens: int = 400_000
     body_s: float = 60.0
     body_idle_s: float = 10.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
+import os
 import socket
 import threading
 import webbrowser
@@ -45,7 +46,7 @@ def listening_socket(host: str, port: int) -> socket.socket:
         except (OSError, UnicodeError):
             raise InputError(f"Expected a host name or address of this machine, got {host!r}.") from None
         try:
-            if hasattr(socket, "SO_REUSEADDR") and socket.SO_REUSEADDR and _is_posix():
+            if os.name == "posix":  # elsewhere it would let two servers share a port
                 listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             listener.bind(address)
             listener.listen(256)
@@ -72,7 +73,14 @@ def server_on(host: str, limits: Limits, start: Maze | None = None) -> uvicorn.S
         proxy_headers=False,
         timeout_graceful_shutdown=CLOSING_S,
     )
-    return uvicorn.Server(config)
+    return _Server(config)
+
+
+class _Server(uvicorn.Server):
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """End all jobs first: their answers would keep connections open."""
+        await self.config.app.app.state.jobs.close()  # type: ignore[union-attr]
+        await super().shutdown(sockets)
 
 
 def serve(server: uvicorn.Server, listener: socket.socket, ready: Callable[[], None]) -> None:
@@ -101,16 +109,14 @@ def _protocol(head_s: float) -> type[H11Protocol]:
     class Protocol(H11Protocol):
         def connection_made(self, transport: Any) -> None:
             super().connection_made(transport)
-            self.loop.call_later(head_s, self._check_head)
+            self.loop.call_later(head_s, self._check, None)
 
-        def _check_head(self) -> None:
-            if self.cycle is None and not self.transport.is_closing():
+        def _check(self, last: Any) -> None:
+            if self.transport.is_closing():
+                return
+            if self.cycle is last and (last is None or last.response_complete):
                 self.transport.close()
+            else:
+                self.loop.call_later(head_s, self._check, self.cycle)
 
     return Protocol
-
-
-def _is_posix() -> bool:
-    import os
-
-    return os.name == "posix"

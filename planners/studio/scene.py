@@ -119,6 +119,7 @@ def free_shapes(parts: Iterable[Polygon]) -> list[dict[str, Any]]:
             "rings": [np.asarray(ring.coords)[:-1, :2].tolist() for ring in (part.exterior, *part.interiors)],
         }
         for part in parts
+        if not part.is_empty
     ]
 
 

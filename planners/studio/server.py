@@ -6,6 +6,8 @@ import asyncio
 import contextlib
 import hashlib
 import importlib.resources
+import math
+import re
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -13,16 +15,18 @@ from typing import Any
 
 from fastapi import FastAPI, Request, Response
 from fastapi.responses import JSONResponse
+from shapely.geometry import LineString, Point
 from starlette.exceptions import HTTPException
 from starlette.types import Receive, Scope, Send
 
 from hrsnake_env.errors import InputError
 from hrsnake_env.ladder import LADDER
+from hrsnake_env.maps import ENDINGS
 from hrsnake_env.maze import MAZES, SEEDED_MAZES, Maze
 from hrsnake_env.mazes import PAPER_LINK_LENGTHS
 from hrsnake_env.random_mazes import LINK_LENGTH
 from planners.planning import PLANNERS
-from planners.studio.guard import Guard, Refusal, Shelf
+from planners.studio.guard import Guard, Refusal, Shelf, refuse
 from planners.studio.jobs import Busy, Job, Jobs
 from planners.studio.limits import Limits
 from planners.studio.requests import REQUESTS, LongestRequest, PlanRequest, read_request
@@ -124,6 +128,12 @@ class _Answer(Response):
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer one request."""
+        try:
+            await self._answer(receive, send)
+        except Refusal as refusal:
+            await refuse(refusal, receive, send, self.shelf.limits)
+
+    async def _answer(self, receive: Receive, send: Send) -> None:
         async with self.shelf.body(receive) as body:
             job = await self._submitted(body)
             del body
@@ -212,14 +222,15 @@ def _about(limits: Limits, start: Maze | None) -> dict[str, Any]:
         "planners": [auto, *planners],
         "mazes": [{"name": name, "link_length": link_length_of(name)} for name in (*MAZES, *LADDER)],
         "exports": [],
-        "map_endings": [],
+        "map_endings": list(ENDINGS),
         "limits": {**limits.to_dict(), "polygon_points": MAX_POINTS},
         "start": None if start is None else start.name,
     }
 
 
 def _first_sentence(planner: Callable[..., Any]) -> str:
-    return (planner.__doc__ or "").strip().partition("\n")[0]
+    first = (planner.__doc__ or "").strip().partition("\n")[0]
+    return re.sub(r" \[\d+\]_|; see `\w+`", "", first)  # what only the reference can show
 
 
 def _version() -> str:
@@ -238,10 +249,18 @@ def link_length_of(name: str) -> float:
     return LINK_LENGTH if name.startswith("random-") else FAMILY_LINK_LENGTH
 
 
+def _fitting_length(maze: Maze) -> float:
+    """Return a link length with which the arm leaves the feeder of any maze."""
+    x, y, heading = maze.base_pose
+    ray = LineString([(x, y), (x + maze.size * math.cos(heading), y + maze.size * math.sin(heading))])
+    free = ray.intersection(maze.free_space.boundary).distance(Point(x, y)) or maze.size
+    return float(f"{min(0.1 * maze.size, 0.5 * free):.2g}")
+
+
 def _named(name: str, start: Maze | None) -> dict[str, Any]:
     """Return a named maze as a drawing; never a file."""
     if start is not None and name == start.name:
-        return {"scene": scene_from_maze(start), "link_length": start.size / 10}
+        return {"scene": scene_from_maze(start), "link_length": _fitting_length(start)}
     kind, _, seed = name.rpartition("-")
     seeded = kind in SEEDED_MAZES and seed.isascii() and seed.isdigit() and len(seed) <= SEED_DIGITS
     if name not in MAZES and name not in LADDER and not seeded:

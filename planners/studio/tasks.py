@@ -3,45 +3,27 @@
 from __future__ import annotations
 
 import base64
-import io
 import math
 import time
-import zipfile
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from hrsnake_env.appearance import COLOURS, FAR, FEEDER_SHARE
 from hrsnake_env.arm import ArmSpec
-from hrsnake_env.contacts import PINCH_TOLERANCE
-from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
-from hrsnake_env.replay import Trace, _packed_trace
+from hrsnake_env.replay import replay_payload
 from planners import longest, tables
 from planners.planning import plan
-from planners.problem import KEYS, Motion, PlanningResult, Progress, ValidationReport, write_motion_arrays
-from planners.studio.requests import (
-    Arm,
-    CheckRequest,
-    LongestRequest,
-    PlanRequest,
-    decoded,
-)
+from planners.problem import Motion, PlanningResult, Progress
+from planners.studio.files import exported, map_read
+from planners.studio.motions import arm_spec, checked, motion_bytes, motion_from
+from planners.studio.requests import CheckRequest, ExportRequest, LongestRequest, MapRequest, PlanRequest
 from planners.studio.scene import maze_from_scene
 from planners.validation import validate
 
 if TYPE_CHECKING:
     from planners.studio.workers import Desk
 
-__all__ = ["TASKS", "motion_from", "warm_up"]
-
-MOTION_BYTES = 256 * 2**20
-"""That the arrays of a motion may take when they are unpacked."""
-
-MOTION_MEMBERS = 16
-"""That a file of a motion may hold."""
+__all__ = ["TASKS", "warm_up"]
 
 
 def warm_up() -> None:
@@ -56,7 +38,7 @@ def warm_up() -> None:
 
 def plan_task(ask: PlanRequest, desk: Desk) -> dict[str, Any]:
     """Plan, check and simulate."""
-    maze, arm = maze_from_scene(ask.scene), _arm(ask.arm)
+    maze, arm = maze_from_scene(ask.scene), arm_spec(ask.arm)
     warm_start = None if ask.warm_start is None else motion_from(ask.warm_start)
     progress, start = _progress(desk), time.perf_counter()
     result = plan(
@@ -151,10 +133,23 @@ def _longest_result(
     }
 
 
+def map_task(ask: MapRequest, desk: Desk) -> dict[str, Any]:
+    """Read a map."""
+    desk.tell(stage="read", share=0.0)
+    return map_read(ask)
+
+
+def export_task(ask: ExportRequest, desk: Desk) -> dict[str, Any]:
+    """Write a file of a run."""
+    return exported(ask, _progress(desk))
+
+
 TASKS: dict[str, Callable[[Any, Desk], dict[str, Any]]] = {
+    "map": map_task,
     "plan": plan_task,
     "check": check_task,
     "longest": longest_task,
+    "export": export_task,
 }
 """What is done for each kind of job."""
 
@@ -162,72 +157,8 @@ TASKS: dict[str, Callable[[Any, Desk], dict[str, Any]]] = {
 # What they share
 
 
-def motion_from(data: str) -> Motion:
-    """Read a motion (.npz in base64) that somebody sent.
-
-    Raises
-    ------
-    InputError
-        If it does not hold a motion, or would be too large when it is unpacked.
-    """
-    raw = decoded(data, "a motion")
-    try:
-        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
-            members = archive.infolist()
-    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
-        raise InputError("Expected a motion (.npz), got a file that is not one.") from None
-    if len(members) > MOTION_MEMBERS or sum(member.file_size for member in members) > MOTION_BYTES:
-        raise InputError(
-            f"Expected a motion of at most {MOTION_BYTES // 2**20} MiB unpacked, got a larger file."
-        )
-    try:
-        with np.load(io.BytesIO(raw), allow_pickle=False) as arrays:
-            values = {key: arrays[key] for key in KEYS}
-    except MemoryError:
-        raise
-    except Exception:  # numpy raises whatever its parsers stumble over
-        raise InputError(
-            f"Expected a motion (.npz) with the keys {', '.join(KEYS)}, got another file."
-        ) from None
-    if any(array.dtype.kind not in "fiu" for array in values.values()) or values["link_length"].size != 1:
-        raise InputError("Expected a motion of numbers, with one link_length.")
-    if values["joint_angles"].ndim == 3:
-        raise InputError("Expected a motion in the plane, got one in space.")
-    length = float(values.pop("link_length").item())
-    return Motion(link_length=length, **values)
-
-
-def packed(motion: Motion) -> str:
-    """Return a motion as `motion_from` reads it."""
-    file = io.BytesIO()
-    write_motion_arrays(file, motion)
-    return base64.b64encode(file.getvalue()).decode("ascii")
-
-
 def _progress(desk: Desk) -> Progress:
     return lambda stage, share: desk.tell(stage=stage, share=round(min(max(share, 0.0), 1.0), 4))
-
-
-def _arm(arm: Arm) -> ArmSpec:
-    limit = None if arm.joint_limit_deg is None else math.radians(arm.joint_limit_deg)
-    return ArmSpec(
-        link_length=arm.link_length, n_links=arm.n_links, link_radius=arm.link_radius, joint_limit=limit
-    )
-
-
-def checked(arm: Arm, motion: Motion, maze: Maze, progress: Progress) -> tuple[ArmSpec, ValidationReport]:
-    """Check a motion that somebody sent exactly; return the arm with as many links as it has, and the report.
-
-    Raises
-    ------
-    InputError
-        If it belongs to another arm or another maze.
-    """
-    spec = _arm(arm)
-    if spec.n_links is not None and spec.n_links != motion.n_links:
-        raise InputError(f"Expected a motion of {spec.n_links} links, got one of {motion.n_links}.")
-    spec = replace(spec, n_links=motion.n_links)
-    return spec, validate(motion, maze, spec, progress)
 
 
 def _planned(result: PlanningResult, seconds: float) -> dict[str, Any]:
@@ -262,16 +193,5 @@ def _watched(
         "verdict": episode.report.to_dict(),
         "success": episode.success,
         "payload": replay_payload([episode.trace(maze, title=title, link_radius=arm.link_radius)]),
-        "motion": packed(motion),
-    }
-
-
-def replay_payload(traces: list[Trace]) -> dict[str, Any]:
-    """Return what the player shows."""
-    return {
-        "colours": COLOURS,
-        "timestep": traces[0].timestep,
-        "feederShare": FEEDER_SHARE,
-        "clearanceScale": [FAR, PINCH_TOLERANCE],
-        "traces": [_packed_trace(trace) for trace in traces],
+        "motion": base64.b64encode(motion_bytes(motion)).decode("ascii"),
     }
