@@ -34,9 +34,9 @@ CHORD = 0.02 * PINCH_TOLERANCE
 STEP_SHARE = 0.8
 """Of the largest step between two poses: what is taken from the cubics stays below."""
 
-DEVIATIONS = (0.5, 0.25, 0.1, 0.04)
-"""How far the rounded path may be off, one after the other, as shares of what the motion leaves of the pinch
-tolerance."""
+DEVIATIONS = (1.0, 0.5, 0.25, 0.1)
+"""How far the rounded path may be off, one after the other, in pinch tolerances. What counts is how deep links
+get, not how far they are off, which is more; so the first is often good enough."""
 
 
 def sampled_motion(trajectory: Trajectory) -> tuple[Motion, FloatArray]:
@@ -258,11 +258,11 @@ def safe_trajectory(
             f"The motion is not valid in '{maze.name}', so it is not exported: {before.faults[0].message}",
             before,
         )
-    left = max(PINCH_TOLERANCE - before.penetration_between / motion.link_length, 0.1 * PINCH_TOLERANCE)
     report = before
     for share in DEVIATIONS:
+        deviation = share * PINCH_TOLERANCE
         trajectory = time_parametrise(
-            motion, limits, rate=rate, deviation=share * left, units=maze.units, progress=progress
+            motion, limits, rate=rate, deviation=deviation, units=maze.units, progress=progress
         )
         report = check_trajectory(trajectory, maze, arm, limits, progress)
         if report.valid:

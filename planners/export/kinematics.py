@@ -29,10 +29,10 @@ class Kinematics(Protocol):
     def joints(self, configurations: FloatArray) -> FloatArray:
         """Return joint positions, shape (n, n_links + 1, 2 or 3), of configurations, shape (n, dof)."""
 
-    def held(self, configurations: FloatArray, feed: FloatArray) -> FloatArray:
-        """Return configurations with the links on the feeder's axis that are not past the base at `feed`.
+    def held(self, configurations: FloatArray, past: FloatArray) -> FloatArray:
+        """Return configurations with straight joints where `past`, shape (n, n_links), is negative.
 
-        Links in front of them keep their headings.
+        In the plane links in front of them keep their headings.
         """
 
 
@@ -50,10 +50,10 @@ class PlanarKinematics:
         base = np.array([x / self.link_length, y / self.link_length, heading])
         return joints_from_configuration(configurations[:, 0], configurations[:, 1:], 1.0, base)
 
-    def held(self, configurations: FloatArray, feed: FloatArray) -> FloatArray:
+    def held(self, configurations: FloatArray, past: FloatArray) -> FloatArray:
         """Return configurations with the links that the feeder holds on its axis."""
         headings = np.cumsum(configurations[:, 1:], axis=1)
-        behind = feed[:, None] < self.n_links - np.arange(self.n_links)
+        behind = past < 0.0
         headings[behind] = 0.0
         result = configurations.copy()
         # Only where something is held: elsewhere angles stay as they are to the last bit.
@@ -86,11 +86,10 @@ class SpatialKinematics:
             joints[:, k + 1] = joints[:, k] + frames[:, 0]
         return joints
 
-    def held(self, configurations: FloatArray, feed: FloatArray) -> FloatArray:
+    def held(self, configurations: FloatArray, past: FloatArray) -> FloatArray:
         """Return configurations with straight joints where the feeder holds them."""
-        behind = feed[:, None] < self.n_links - np.arange(self.n_links)
         result = configurations.copy()
-        result[:, 1:][np.repeat(behind, 2, axis=1)] = 0.0
+        result[:, 1:][np.repeat(past < 0.0, 2, axis=1)] = 0.0
         return result
 
 

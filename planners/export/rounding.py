@@ -19,13 +19,14 @@ from hrsnake_env.arm import FloatArray
 from planners.export.kinematics import Kinematics
 from planners.problem import Progress
 
-__all__ = ["Polyline", "RoundedPath", "rounded_path"]
+__all__ = ["Polyline", "RoundedPath", "release_ways", "rounded_path"]
 
 SPACING = 0.1
 """Of the control points where nothing is near a corner, in link lengths of feed."""
 
-TURN_PER_LENGTH = 8.0
-"""Where joints turn while the feed hardly moves, so many rad count as a link length."""
+TURN_PER_LENGTH = 16.0
+"""Where joints turn while the feed hardly moves, so many rad count as a link length: no joint turns faster when
+the feeder lets go of it (`hrsnake_env.arm.feeder_angle_limits`), so places are feeds where the feed only grows."""
 
 ROUNDS = 14
 """How often the spacing is halved at most."""
@@ -71,15 +72,6 @@ class Polyline:
         share = np.clip((place - self.place[after - 1]) / span, 0.0, 1.0)[:, None]
         return np.asarray((1.0 - share) * self.poses[after - 1] + share * self.poses[after])
 
-    def least_feed(self, first: FloatArray, last: FloatArray) -> FloatArray:
-        """Return the least feed from one place to another, both shape (n,)."""
-        least = np.minimum(self(first)[:, 0], self(last)[:, 0])
-        if (np.diff(self.poses[:, 0]) >= 0.0).all():
-            return np.asarray(least)
-        a, b = np.searchsorted(self.place, first), np.searchsorted(self.place, last)
-        inside = [self.poses[i:j, 0].min(initial=np.inf) for i, j in zip(a, b, strict=True)]
-        return np.minimum(least, inside)
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RoundedPath:
@@ -105,7 +97,7 @@ def rounded_path(
     kinematics: Kinematics,
     *,
     deviation: float,
-    release: float = 0.0,
+    release: FloatArray,
     progress: Progress | None = None,
 ) -> RoundedPath:
     """Round the corners of a motion.
@@ -119,9 +111,8 @@ def rounded_path(
     deviation : float
         How far a joint may get from where the motion has it, in link lengths. Held up to `ROUNDS` halvings of
         the spacing.
-    release : float
-        How far past the base a joint has to be before it bends, in link lengths: what is sampled later must not
-        bend it before the base.
+    release : array, shape (n_links,)
+        How far past the base each joint has to be before it bends, in link lengths (`release_ways`).
     progress : callable, optional
         Called with "round" and the share of the way that is done.
     """
@@ -147,16 +138,53 @@ def rounded_path(
     return RoundedPath(spline=spline, breaks=breaks, deviation=float(off.max()))
 
 
-def _spline(line: Polyline, kinematics: Kinematics, breaks: FloatArray, release: float) -> BSpline:
+def release_ways(line: Polyline, n_links: int, *, longest: float, deviation: float) -> FloatArray:
+    """Choose how far past the base each joint is when it starts to bend, in link lengths, shape (n_links,).
+
+    Samples around the moment at which a joint starts to bend must not bend it before the base. The longer the
+    way, the faster the arm may be there; but a joint that starts later is off by the angle that it would have
+    had by then, so where a motion bends it at once the way is short, and the arm has to be slow.
+
+    Parameters
+    ----------
+    line : Polyline
+        The motion.
+    n_links : int
+        Number of links.
+    longest : float
+        How far the feed goes in the time that samples act on.
+    deviation : float
+        How far a joint may be off for that reason.
+    """
+    feed = line.poses[:, 0]
+    past = feed[:, None] - (n_links - np.arange(n_links))
+    angles = np.abs(line.poses[:, 1:]).reshape(len(feed), n_links, -1).max(axis=2)
+    near = (past > 1e-9) & (past <= longest + np.abs(np.diff(feed)).max())
+    rates = np.divide(angles, past, out=np.zeros_like(past), where=near).max(axis=0)
+    return np.asarray(np.minimum(longest, deviation / np.maximum(rates, deviation / longest)))
+
+
+def _spline(line: Polyline, kinematics: Kinematics, breaks: FloatArray, release: FloatArray) -> BSpline:
     ends = np.repeat(breaks[[0, -1]], DEGREE)
     knots = np.concatenate([ends[:DEGREE], breaks, ends[DEGREE:]])
     # The averages of knots at which a spline of the line's own values keeps straight lines straight.
     places = sum(knots[1 + k : len(knots) - DEGREE + k] for k in range(DEGREE)) / DEGREE
     control = line(np.clip(places, 0.0, line.length))
-    first, last = knots[: -DEGREE - 1], knots[DEGREE + 1 :]
-    held = kinematics.held(control, line.least_feed(first, last) - release)
+    n_links = kinematics.n_links
+    least = _least_feed(BSpline(knots, control[:, 0], DEGREE), breaks)
+    past = least[:, None] - (n_links - np.arange(n_links) + release)
+    held = kinematics.held(control, past)
     held[0], held[-1] = control[0], control[-1]
     return BSpline(knots, held, DEGREE)
+
+
+def _least_feed(feed: BSpline, breaks: FloatArray) -> FloatArray:
+    """Return the least feed wherever each control point acts, shape (n_control,)."""
+    middles = 0.5 * (breaks[:-1] + breaks[1:])
+    ends = feed(breaks)
+    pieces = np.minimum(np.minimum(ends[:-1], ends[1:]), feed(middles))
+    padded = np.pad(pieces, DEGREE, mode="edge")
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, DEGREE + 1).min(axis=1))
 
 
 def _deviations(

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from hrsnake_env.arm import FloatArray
 from hrsnake_env.errors import InputError
 from planners.checks.tolerances import PINCH_TOLERANCE
 from planners.export.kinematics import configurations, kinematics_of
-from planners.export.rounding import Polyline, RoundedPath, rounded_path
+from planners.export.rounding import Polyline, RoundedPath, release_ways, rounded_path
 from planners.export.trajectory import DEFAULT_RATE, LARGEST_RATE, Trajectory, TrajectoryLimits
 from planners.problem import Motion, Progress
 from planners.spatial.problem import SpatialMotion
@@ -34,8 +35,11 @@ LONGEST = 2_000_000
 STRETCHES = 12
 """How often the time is stretched at most where limits are found to be exceeded."""
 
+GRID_STEP = 1e-9
+"""Places closer than this to another are one, in link lengths."""
+
 REACH = 3.0
-"""Samples that the release of a joint acts on before its own: of the spline in time."""
+"""Steps between samples over which a control point of a cubic spline in time acts before and after."""
 
 
 def time_parametrise(
@@ -85,14 +89,12 @@ def time_parametrise(
     line = Polyline(poses)
     if line.length == 0.0:
         raise InputError("Expected a motion that moves, got one that stays where it is.")
-    path = rounded_path(
-        line,
-        kinematics,
-        deviation=deviation,
-        release=REACH * float(speeds[0]) / rate,
-        progress=progress,
+    release = release_ways(
+        line, motion.n_links, longest=REACH * float(speeds[0]) / rate, deviation=deviation / 2.0
     )
-    clock, places = _fastest(path, speeds, accelerations)
+    path = rounded_path(line, kinematics, deviation=deviation, release=release, progress=progress)
+    caps = _ReleaseCaps.of(path, release, rate)
+    clock, places = _fastest(path, caps, speeds, accelerations)
     samples, stays = _sampled(path, clock, places, speeds, accelerations, float(rate))
     if progress is not None:
         progress("time", 1.0)
@@ -145,7 +147,46 @@ class _ToppraPath:
         return self(places, 2)
 
 
-def _fastest(path: RoundedPath, speeds: FloatArray, accelerations: FloatArray) -> tuple[FloatArray, FloatArray]:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _ReleaseCaps:
+    """Hold where the feed has to be slow, so that no sample bends a joint before the base.
+
+    Between the base and where it starts to bend, each joint has to stay as long as samples act: to be slow at
+    both ends of that way, which are places of the grid, is enough, as squared speeds are linear in between.
+
+    Parameters
+    ----------
+    places : array, shape (n,)
+        Along the path, in order.
+    speeds : array, shape (n,)
+        Largest feed speed there, in link lengths per s.
+    """
+
+    places: FloatArray
+    speeds: FloatArray
+
+    @classmethod
+    def of(cls, path: RoundedPath, release: FloatArray, rate: float) -> _ReleaseCaps:
+        """Find the places on a path at which joints are released, or come back."""
+        grid = np.sort(np.concatenate([path.breaks, 0.5 * (path.breaks[:-1] + path.breaks[1:])]))
+        feed = path.spline(grid)[:, 0]
+        n_links = len(release)
+        places, speeds = [np.empty(0)], [np.empty(0)]
+        for joint in np.flatnonzero(release < release.max(initial=0.0)):
+            for share in (-0.5, 0.0, 1.0, 1.5):
+                level = n_links - joint + share * release[joint]
+                crossed = np.flatnonzero((feed[:-1] - level) * (feed[1:] - level) < 0.0)
+                part = (level - feed[crossed]) / (feed[crossed + 1] - feed[crossed])
+                places.append(grid[crossed] + part * (grid[crossed + 1] - grid[crossed]))
+                speeds.append(np.full(len(crossed), release[joint] * rate / REACH))
+        found, caps = np.concatenate(places), np.concatenate(speeds)
+        order = np.argsort(found, kind="stable")
+        return cls(places=found[order], speeds=caps[order])
+
+
+def _fastest(
+    path: RoundedPath, caps: _ReleaseCaps, speeds: FloatArray, accelerations: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Find the fastest way along a path: times and speeds along it at a grid of places.
 
     Returns
@@ -158,11 +199,17 @@ def _fastest(path: RoundedPath, speeds: FloatArray, accelerations: FloatArray) -
     toppra = _toppra()
     moving = np.ptp(path.spline.c, axis=0) > 0.0
     middles = 0.5 * (path.breaks[:-1] + path.breaks[1:])
-    places = np.sort(np.concatenate([path.breaks, middles]))
-    both = [np.stack([-limit[moving], limit[moving]], axis=1) for limit in (speeds, accelerations)]
+    places = _apart(np.sort(np.concatenate([path.breaks, middles, caps.places])))
+    most = np.repeat(speeds[None], len(places), axis=0)
+    where = np.clip(np.searchsorted(places, caps.places - GRID_STEP), 0, len(places) - 1)
+    np.minimum.at(most[:, 0], where, caps.speeds)
+    most = most[:, moving]
+    both = np.stack([-most, most], axis=2)
+    limit = accelerations[moving]
     constraint = toppra.constraint
+    speed = constraint.JointVelocityConstraintVarying(lambda place: both[np.searchsorted(places, place)])
     solver = toppra.algorithm.TOPPRA(
-        [constraint.JointVelocityConstraint(both[0]), constraint.JointAccelerationConstraint(both[1])],
+        [speed, constraint.JointAccelerationConstraint(np.stack([-limit, limit], axis=1))],
         _ToppraPath(path, moving),
         gridpoints=places,
         solver_wrapper="seidel",
@@ -176,6 +223,16 @@ def _fastest(path: RoundedPath, speeds: FloatArray, accelerations: FloatArray) -
         )
     times = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(places) / (along[1:] + along[:-1]))])
     return np.stack([times, along], axis=1), places
+
+
+def _apart(places: FloatArray) -> FloatArray:
+    """Leave out of sorted places those that are next to the one before."""
+    keep = np.concatenate([[True], np.diff(places) > GRID_STEP])
+    keep[-1] = True
+    kept = places[keep]
+    if len(kept) > 2 and kept[-1] - kept[-2] <= GRID_STEP:
+        kept = np.delete(kept, -2)
+    return kept
 
 
 def _place_at(clock: FloatArray, places: FloatArray, times: FloatArray) -> FloatArray:
