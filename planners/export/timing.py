@@ -11,7 +11,6 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -37,6 +36,9 @@ STRETCHES = 12
 
 GRID_STEP = 1e-9
 """Places closer than this to another are one, in link lengths."""
+
+RELEASE_SHARES = (-0.5, 0.0, 1.0, 1.5)
+"""Where the arm is slow around the release of a joint, as shares of the way to where it starts to bend."""
 
 REACH = 3.0
 """Steps between samples over which a control point of a cubic spline in time acts before and after."""
@@ -93,8 +95,9 @@ def time_parametrise(
         line, motion.n_links, longest=REACH * float(speeds[0]) / rate, deviation=deviation / 2.0
     )
     path = rounded_path(line, kinematics, deviation=deviation, release=release, progress=progress)
-    caps = _ReleaseCaps.of(path, release, rate)
-    clock, places = _fastest(path, caps, speeds, accelerations)
+    places = _grid(path, release)
+    feed_speeds = _feed_speeds(path.spline(places)[:, 0], release, float(speeds[0]), float(rate))
+    clock = _fastest(path, places, feed_speeds, speeds, accelerations)
     samples, stays = _sampled(path, clock, places, speeds, accelerations, float(rate))
     if progress is not None:
         progress("time", 1.0)
@@ -147,62 +150,72 @@ class _ToppraPath:
         return self(places, 2)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _ReleaseCaps:
-    """Hold where the feed has to be slow, so that no sample bends a joint before the base.
+def _grid(path: RoundedPath, release: FloatArray) -> FloatArray:
+    """Choose places along the path for TOPP-RA: breaks, middles, and where joints are released slowly."""
+    grid = np.sort(np.concatenate([path.breaks, 0.5 * (path.breaks[:-1] + path.breaks[1:])]))
+    feed = path.spline(grid)[:, 0]
+    found = [grid]
+    for joint in np.flatnonzero(release < release.max(initial=0.0)):
+        for share in RELEASE_SHARES:
+            level = len(release) - joint + share * release[joint]
+            crossed = np.flatnonzero((feed[:-1] - level) * (feed[1:] - level) < 0.0)
+            part = (level - feed[crossed]) / (feed[crossed + 1] - feed[crossed])
+            found.append(grid[crossed] + part * (grid[crossed + 1] - grid[crossed]))
+    return _apart(np.sort(np.concatenate(found)))
 
-    Between the base and where it starts to bend, each joint has to stay as long as samples act: to be slow at
-    both ends of that way, which are places of the grid, is enough, as squared speeds are linear in between.
 
-    Parameters
-    ----------
-    places : array, shape (n,)
-        Along the path, in order.
-    speeds : array, shape (n,)
-        Largest feed speed there, in link lengths per s.
+def _apart(places: FloatArray) -> FloatArray:
+    """Leave out of sorted places those that are next to the one before, but never the last."""
+    keep = np.concatenate([[True], np.diff(places) > GRID_STEP])
+    kept = places[keep]
+    kept[-1] = places[-1]
+    return kept
+
+
+def _feed_speeds(feed: FloatArray, release: FloatArray, fastest: float, rate: float) -> FloatArray:
+    """Return the largest speed of the feed at places of this feed, in link lengths per s.
+
+    Between the base and where it starts to bend, a joint has to stay as long as samples act, so that none of
+    them bends it before the base.
     """
-
-    places: FloatArray
-    speeds: FloatArray
-
-    @classmethod
-    def of(cls, path: RoundedPath, release: FloatArray, rate: float) -> _ReleaseCaps:
-        """Find the places on a path at which joints are released, or come back."""
-        grid = np.sort(np.concatenate([path.breaks, 0.5 * (path.breaks[:-1] + path.breaks[1:])]))
-        feed = path.spline(grid)[:, 0]
-        n_links = len(release)
-        places, speeds = [np.empty(0)], [np.empty(0)]
-        for joint in np.flatnonzero(release < release.max(initial=0.0)):
-            for share in (-0.5, 0.0, 1.0, 1.5):
-                level = n_links - joint + share * release[joint]
-                crossed = np.flatnonzero((feed[:-1] - level) * (feed[1:] - level) < 0.0)
-                part = (level - feed[crossed]) / (feed[crossed + 1] - feed[crossed])
-                places.append(grid[crossed] + part * (grid[crossed + 1] - grid[crossed]))
-                speeds.append(np.full(len(crossed), release[joint] * rate / REACH))
-        found, caps = np.concatenate(places), np.concatenate(speeds)
-        order = np.argsort(found, kind="stable")
-        return cls(places=found[order], speeds=caps[order])
+    speeds = np.full(len(feed), fastest)
+    first, last = RELEASE_SHARES[0], RELEASE_SHARES[-1]
+    for joint in np.flatnonzero(release < release.max(initial=0.0)):
+        share = (feed - (len(release) - joint)) / release[joint]
+        near = (share > first - 0.1) & (share < last + 0.1)
+        speeds[near] = np.minimum(speeds[near], release[joint] * rate / REACH)
+    return speeds
 
 
 def _fastest(
-    path: RoundedPath, caps: _ReleaseCaps, speeds: FloatArray, accelerations: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Find the fastest way along a path: times and speeds along it at a grid of places.
+    path: RoundedPath,
+    places: FloatArray,
+    feed_speeds: FloatArray,
+    speeds: FloatArray,
+    accelerations: FloatArray,
+) -> FloatArray:
+    """Find the fastest way along a path.
+
+    Parameters
+    ----------
+    path : RoundedPath
+        The path.
+    places : array, shape (n,)
+        Along it, in order, from its start to its end.
+    feed_speeds : array, shape (n,)
+        Largest speed of the feed at each place, in link lengths per s.
+    speeds, accelerations : array, shape (dof,)
+        The limits.
 
     Returns
     -------
     clock : array, shape (n, 2)
         Time, and speed along the path, at each place.
-    places : array, shape (n,)
-        Along the path.
     """
     toppra = _toppra()
     moving = np.ptp(path.spline.c, axis=0) > 0.0
-    middles = 0.5 * (path.breaks[:-1] + path.breaks[1:])
-    places = _apart(np.sort(np.concatenate([path.breaks, middles, caps.places])))
     most = np.repeat(speeds[None], len(places), axis=0)
-    where = np.clip(np.searchsorted(places, caps.places - GRID_STEP), 0, len(places) - 1)
-    np.minimum.at(most[:, 0], where, caps.speeds)
+    most[:, 0] = feed_speeds
     most = most[:, moving]
     both = np.stack([-most, most], axis=2)
     limit = accelerations[moving]
@@ -222,7 +235,7 @@ def _fastest(
             "try larger limits of acceleration."
         )
     times = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(places) / (along[1:] + along[:-1]))])
-    return np.stack([times, along], axis=1), places
+    return np.stack([times, along], axis=1)
 
 
 def _apart(places: FloatArray) -> FloatArray:
