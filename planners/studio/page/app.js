@@ -118,7 +118,8 @@ async function plan() {
     return done;
   });
   const solved = (found ?? []).filter(Boolean);
-  if (found && found.length === names.length && solved.length) watchRuns(solved);
+  if (found && solved.length === names.length) watchRuns(solved);
+  else if (found) byId("outcomes").scrollIntoView({ block: "nearest" });
 }
 /** Show an answer; returns its run if there is a motion. */
 function answered({ planner, result, scene, arm, seconds }) {
@@ -145,6 +146,7 @@ async function longest() {
     ? runs.add({ title: titleOf(scene, result, panel.planner), planner: result.planner, arm: { ...arm, link_length: result.length }, scene, result }) : null;
   const use = (length) => { panel.set({ link_length: shortened(length), n_links: "" }); byId("link-length").focus(); };
   byId("outcomes").replaceChildren(longestCard({ result, scene, use, watch: run && (() => watchRuns([run])) }));
+  byId("outcomes").scrollIntoView({ block: "nearest" });
 }
 /** Six digits, rounded down: a rounded-up length may not pass. */
 function shortened(length) {

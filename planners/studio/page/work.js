@@ -32,6 +32,7 @@ export class Work {
     Object.assign(byId("stop"), { hidden: !stoppable, disabled: false });
     byId("work").hidden = byId("work-time").hidden = false;
     byId("work-time").textContent = "";
+    byId("work").scrollIntoView({ block: "nearest" });
     try {
       return await act((path, body, name) => this.ask(path, body, name ?? title));
     } catch (error) {
