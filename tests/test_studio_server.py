@@ -606,6 +606,76 @@ def test_an_unknown_option_of_maps_is_refused(studio: Studio) -> None:
     assert studio.post("/api/map", {"files": []})[0] == 422
 
 
+# Exports
+
+
+@pytest.fixture(scope="module")
+def run(studio: Studio) -> dict[str, Any]:
+    """Plan once for all exports."""
+    motion = _last(studio.post("/api/plan", PLAN)[1])["motion"]
+    return {"scene": SMALL, "arm": PLAN["arm"], "motion": motion, "title": "The bend, <at> 300 px"}
+
+
+def test_every_format_that_is_offered_says_what_it_is(studio: Studio) -> None:
+    formats = json.loads(studio.get("/api/about")[2])["exports"]
+    assert {"geojson", "motion", "html", "csv"} <= {each["name"] for each in formats}
+    assert all(each["about"] and each["ending"].startswith(".") for each in formats)
+
+
+def test_a_maze_is_exported_without_a_motion(studio: Studio, run: dict[str, Any]) -> None:
+    ask = {"format": "geojson", "runs": [{**run, "motion": None}]}
+    result = _last(studio.post("/api/export", ask)[1])
+    maze = Maze.from_geojson(json.loads(base64.b64decode(result["data"])))
+    assert maze.free_space.equals(_named(SMALL, "bend").free_space)
+    assert (result["name"], result["type"]) == ("The-bend-at-300-px.geojson", "application/geo+json")
+
+
+def test_a_motion_is_exported_as_it_is(studio: Studio, run: dict[str, Any]) -> None:
+    result = _last(studio.post("/api/export", {"format": "motion", "runs": [run]})[1])
+    assert np.array_equal(motion_from(result["data"]).joints, motion_from(run["motion"]).joints)
+
+
+def test_two_runs_are_one_page(studio: Studio, run: dict[str, Any]) -> None:
+    ask = {"format": "html", "runs": [run, {**run, "title": "the other"}]}
+    page = base64.b64decode(_last(studio.post("/api/export", ask)[1])["data"]).decode()
+    assert "the other" in page and "<at>" not in page
+
+
+def test_a_trajectory_keeps_the_limits_that_were_given(studio: Studio, run: dict[str, Any]) -> None:
+    durations = []
+    for speed in (100.0, 50.0):
+        limits = {"feed_speed": speed, "feed_acceleration": 1e4}
+        ask = {"format": "csv", "runs": [run], "limits": limits, "rate": 20.0}
+        data = base64.b64decode(_last(studio.post("/api/export", ask)[1])["data"]).decode()
+        durations.append(float(data.strip().splitlines()[-1].split(",")[0]))
+    assert durations[1] > 1.5 * durations[0] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"format": "docx"}, "Unknown format 'docx'"),
+        ({"format": "urdf"}, "metre"),
+        ({"limits": {"wit": 3.0}}, "Unknown limit 'wit'"),
+        ({"runs": 2}, "Expected one run"),
+        ({"motion": None}, "plan first"),
+        ({"motion": "forged"}, "Expected a valid motion"),
+    ],
+)
+def test_what_cannot_be_exported_gets_a_sentence(
+    studio: Studio, run: dict[str, Any], change: dict[str, Any], sentence: str
+) -> None:
+    change = dict(change)
+    good = motion_from(run["motion"])
+    forged = Motion.from_configurations(good.feed, good.joint_angles * 1.2, good.link_length, good.base_pose)
+    motions = {None: None, "forged": _sent(forged), "good": run["motion"]}
+    runs = [{**run, "motion": motions[change.pop("motion", "good")]}] * change.pop("runs", 1)
+    ask = {"format": "csv", "runs": runs, **change}
+    status, lines = studio.post("/api/export", ask)
+    assert status == 200 and lines[-1].get("kind") == "input", lines[-1]
+    assert sentence in lines[-1]["message"]
+
+
 # Motions that were sent
 
 
@@ -633,7 +703,7 @@ def _npy(array: Any) -> bytes:
         (_archive(joints=_npy(np.zeros(3))), "with the keys"),
         (
             _archive(**dict.fromkeys(("joints", "joint_angles", "feed", "link_length", "base_pose"), b"x")),
-            "keys",
+            "of numbers",
         ),
         (
             _archive(

@@ -23,26 +23,14 @@ from planners.studio.scene import MAX_POINTS, free_shapes, maze_from_scene
 if TYPE_CHECKING:
     from planners.export import TrajectoryLimits
 
-__all__ = ["OWN_EXPORTS", "exported", "map_read", "uploaded"]
+__all__ = ["export_formats", "exported", "map_read", "uploaded"]
 
-TYPES = {
-    ".csv": "text/csv",
-    ".geojson": "application/geo+json",
-    ".gif": "image/gif",
-    ".html": "text/html",
-    ".json": "application/json",
-    ".mp4": "video/mp4",
-    ".urdf": "application/xml",
-    ".yaml": "application/yaml",
+OWN_EXPORTS: dict[str, tuple[str, str, str]] = {
+    "geojson": (".geojson", "application/geo+json", "the maze, as `hrsnake plan` takes it"),
+    "motion": (".npz", "application/octet-stream", "the motion without time, as `hrsnake simulate` takes it"),
+    "html": (".html", "text/html", "a page that plays the run, or two side by side"),
 }
-"""Media types by ending; of any other file nothing is said."""
-
-OWN_EXPORTS: dict[str, tuple[str, str]] = {
-    "geojson": (".geojson", "The maze, as hrsnake plan takes it."),
-    "motion": (".npz", "The motion without time, as hrsnake validate and simulate take it."),
-    "html": (".html", "A page that plays the run, or two side by side, in any browser."),
-}
-"""What the studio writes itself: ending, and what it is."""
+"""What the studio writes itself: ending, media type, and what it is."""
 
 
 # Maps
@@ -117,6 +105,14 @@ def _scene_of(reading: MapReading) -> dict[str, Any]:
 # Exports
 
 
+def export_formats() -> dict[str, tuple[str, str, str]]:
+    """Return ending, media type and meaning of each format by its name."""
+    from planners.export import EXPORTS
+
+    others = {name: (each.ending, each.media_type, each.title) for name, each in EXPORTS.items()}
+    return {**others, **OWN_EXPORTS}
+
+
 def exported(ask: ExportRequest, progress: Progress) -> dict[str, Any]:
     """Return a file of one run, or of two side by side; every motion is checked exactly before.
 
@@ -125,38 +121,41 @@ def exported(ask: ExportRequest, progress: Progress) -> dict[str, Any]:
     InputError
         If there is no such format, a motion is missing or not valid, or an option is out of its range.
     """
-    from planners.export import EXPORTS
+    from planners.export import ExportRefused
 
-    if ask.format not in OWN_EXPORTS and ask.format not in EXPORTS:
-        names = ", ".join(dict.fromkeys([*OWN_EXPORTS, *EXPORTS]))
+    if ask.format not in export_formats():
+        names = ", ".join(export_formats())
         raise InputError(f"Unknown format {ask.format[:40]!r}. Available: {names}.")
     if len(ask.runs) > 1 and ask.format != "html":
         raise InputError(f"Expected one run for {ask.format}, got {len(ask.runs)}: html alone shows two.")
-    data, ending = _data(ask, progress)
+    try:
+        data = _data(ask, progress)
+    except ExportRefused as refusal:
+        raise InputError(str(refusal)) from None
+    ending, kind, _ = export_formats()[ask.format]
     run = ask.runs[0]
     return {
         "name": _file_name(run.title or run.scene.name) + ending,
-        "type": TYPES.get(ending, "application/octet-stream"),
+        "type": kind,
         "data": base64.b64encode(data).decode("ascii"),
     }
 
 
-def _data(ask: ExportRequest, progress: Progress) -> tuple[bytes, str]:
-    """Return the contents of a file, and its ending."""
-    from planners.export import EXPORTS, export_bytes
+def _data(ask: ExportRequest, progress: Progress) -> bytes:
+    """Return the contents of a file."""
+    from planners.export import export_bytes
 
     run = ask.runs[0]
     maze = maze_from_scene(run.scene)
-    if ask.format in OWN_EXPORTS:
-        ending = OWN_EXPORTS[ask.format][0]
-        if ask.format == "geojson":
-            return (json.dumps(maze.to_geojson(), indent=1) + "\n").encode(), ending
-        if ask.format == "html":
-            return _page(ask.runs, progress), ending
-        return motion_bytes(_valid(run, maze, progress)[0]), ending
+    if ask.format == "geojson":
+        return (json.dumps(maze.to_geojson(), indent=1) + "\n").encode()
+    if ask.format == "html":
+        return _page(ask.runs, progress)
+    if ask.format == "motion":
+        return motion_bytes(_valid(run, maze, progress)[0])
     motion, arm = _valid(run, maze, progress)
     options: dict[str, Any] = {} if ask.rate is None else {"rate": ask.rate}
-    data = export_bytes(
+    return export_bytes(
         motion,
         maze,
         arm,
@@ -166,7 +165,6 @@ def _data(ask: ExportRequest, progress: Progress) -> tuple[bytes, str]:
         progress=progress,
         **options,
     )
-    return data, EXPORTS[ask.format].ending
 
 
 def _valid(run: Run, maze: Maze, progress: Progress) -> tuple[Motion, ArmSpec]:

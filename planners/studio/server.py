@@ -26,6 +26,7 @@ from hrsnake_env.maze import MAZES, SEEDED_MAZES, Maze
 from hrsnake_env.mazes import PAPER_LINK_LENGTHS
 from hrsnake_env.random_mazes import LINK_LENGTH
 from planners.planning import PLANNERS
+from planners.studio.files import export_formats
 from planners.studio.guard import Guard, Refusal, Shelf, refuse
 from planners.studio.jobs import Busy, Job, Jobs
 from planners.studio.limits import Limits
@@ -100,7 +101,7 @@ def studio_app(limits: Limits, host: str = "127.0.0.1", start: Maze | None = Non
 
     @app.get("/api/about")
     async def about() -> Response:
-        return JSONResponse(_about(limits, start))
+        return JSONResponse(await asyncio.to_thread(_about, limits, start))
 
     @app.get("/api/mazes/{name}")
     async def maze(name: str) -> Response:
@@ -221,7 +222,10 @@ def _about(limits: Limits, start: Maze | None) -> dict[str, Any]:
         "version": _version(),
         "planners": [auto, *planners],
         "mazes": [{"name": name, "link_length": link_length_of(name)} for name in (*MAZES, *LADDER)],
-        "exports": [],
+        "exports": [
+            {"name": name, "ending": ending, "about": about}
+            for name, (ending, _, about) in export_formats().items()
+        ],
         "map_endings": list(ENDINGS),
         "limits": {**limits.to_dict(), "polygon_points": MAX_POINTS},
         "start": None if start is None else start.name,
