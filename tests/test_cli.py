@@ -412,3 +412,9 @@ def test_the_shell_completes_mazes_files_and_planners(run, monkeypatch):
     assert completed("hrsnake plan fig1") == ["fig19", "fig17a", "fig17b", "fig17c", "fig17d"]
     assert completed("hrsnake plan figu") == ["figures.geojson"]
     assert completed("hrsnake plan fig19 --planner as") == ["as-printed"]
+
+
+def test_a_map_that_is_given_as_a_maze_is_to_be_imported_first(run):
+    Path("duct.svg").write_text("<svg/>")
+    code, _, err = run("plan", "duct.svg", "--link-length", 1)
+    assert code == 2 and "`hrsnake import duct.svg --out maze.geojson`" in err
