@@ -184,8 +184,8 @@ class Maze:
         if Path(text).suffix.lower() not in (".geojson", ".json"):
             if Path(text).is_file():
                 raise InputError(
-                    f"Expected a maze (.geojson), but '{text}' is another file: if it is a map, `hrsnake import "
-                    f"{text} --out maze.geojson` makes a maze of it."
+                    f"Expected a maze (.geojson), but '{text}' is another file: if it is a map, "
+                    f"`hrsnake import {text} --out maze.geojson` makes a maze of it."
                 )
             names = [*MAZES, *(f"{kind}-SEED" for kind in SEEDED_MAZES), *RUNG_MAZES]
             raise InputError(
