@@ -22,7 +22,7 @@ from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
 from hrsnake_env.pages import filled, framed
 
-__all__ = ["QUANTUM", "Trace", "replay_html", "save_replay", "show"]
+__all__ = ["QUANTUM", "Trace", "replay_html", "replay_payload", "save_replay", "show"]
 
 QUANTUM = 1e-4
 """In link lengths: the page holds places and clearances as whole multiples of it. No coordinate is off by
@@ -170,20 +170,42 @@ def save_replay(traces: Sequence[Trace], out: str | os.PathLike[str]) -> None:
 def replay_html(traces: Sequence[Trace]) -> str:
     """Return the page that `save_replay` writes."""
     traces = tuple(traces)
+    payload = replay_payload(traces)
+    title = " | ".join(trace.title for trace in traces)
+    parts = {"style": _text("player.css"), "script": _text("player.js")}
+    return filled(_text("replay.html"), title, payload, **parts)
+
+
+def replay_payload(traces: Sequence[Trace]) -> dict[str, Any]:
+    """Return what `HrsnakePlayer.mount` of `player.js` plays, as plain data for JSON.
+
+    Parameters
+    ----------
+    traces : sequence of one or two Trace
+        As in `save_replay`. Payloads of one timestep may be joined by joining their `traces`.
+
+    Raises
+    ------
+    InputError
+        As `save_replay`.
+    """
+    traces = tuple(traces)
     if not 1 <= len(traces) <= MAX_TRACES:
         raise InputError(f"Expected one or two runs to replay, got {len(traces)}.")
     timesteps = [trace.timestep for trace in traces]
     if len(set(timesteps)) > 1:
         raise InputError(f"Expected runs with one timestep, as they share a clock, got {timesteps}.")
-    payload = {
+    return {
         "colours": COLOURS,
         "timestep": timesteps[0],
         "feederShare": FEEDER_SHARE,
         "clearanceScale": [FAR, PINCH_TOLERANCE],
         "traces": [_packed_trace(trace) for trace in traces],
     }
-    template = importlib.resources.files("hrsnake_env").joinpath("replay.html").read_text(encoding="utf-8")
-    return filled(template, " | ".join(trace.title for trace in traces), payload)
+
+
+def _text(name: str) -> str:
+    return importlib.resources.files("hrsnake_env").joinpath(name).read_text(encoding="utf-8")
 
 
 def show(traces: Sequence[Trace], height: int = 720) -> Any:
