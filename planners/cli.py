@@ -17,8 +17,11 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners import longest, tables
 from planners.cli_bench import bench_app
+from planners.cli_export import export_command
 from planners.cli_learn import dataset_command, evaluate_command, train_command
+from planners.cli_maps import import_command
 from planners.cli_spatial import spatial_app
+from planners.cli_studio import studio_command
 from planners.cli_tools import (
     BAD_INPUT,
     INTERRUPTED,
@@ -333,6 +336,31 @@ for _panel, _name, _command, _examples in (
         "longest",
         longest_command,
         ["hrsnake longest fig19 --plot links.png --state fig19.json"],
+    ),
+    (
+        OWN,
+        "studio",
+        studio_command,
+        ["hrsnake studio", "hrsnake studio duct.geojson --port 9000 --no-browser"],
+    ),
+    (
+        OWN,
+        "import",
+        import_command,
+        [
+            "hrsnake import duct.yaml --picture duct.png",
+            "hrsnake import duct.yaml --base 0.1,0.5,0 --goal 10,0.5 --out duct.geojson",
+            "hrsnake import casing.svg --units mm --walls vanes --out casing.geojson",
+        ],
+    ),
+    (
+        OWN,
+        "export",
+        export_command,
+        [
+            "hrsnake export duct.geojson duct.npz --out duct.yaml --joint-speed 45",
+            "hrsnake export fig19 m.npz --out arm.urdf --metres-per-unit 0.001",
+        ],
     ),
     (OWN, "draw", draw_command, ["hrsnake draw fig19 m.npz --out fig19.png"]),
     (LEARNING, "play", play_command, ["hrsnake play fig19"]),
