@@ -300,9 +300,9 @@ def test_links_too_long_for_the_room_end_in_a_dead_end_that_says_where():
 
 def test_a_dead_end_of_thick_links_counts_their_radius_and_names_the_joint_limit():
     workspace = two_panels()
-    arm = ArmSpec(link_length=70.0, link_radius=4.0, joint_limit=math.radians(50.0))
+    arm = ArmSpec(link_length=80.0, link_radius=4.0, joint_limit=math.radians(30.0))
     result = plan(workspace, arm)
-    assert result.status is PlanningStatus.DEAD_END and "joints of at most 50 degrees" in result.reason
+    assert result.status is PlanningStatus.DEAD_END and "joints of at most 30 degrees" in result.reason
     low, high = workspace.obstacles[result.failure.wall]
     a, b = result.failure.joints
     link = a + np.linspace(0.0, 1.0, 2001)[:, None] * (b - a)
