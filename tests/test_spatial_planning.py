@@ -10,6 +10,7 @@ import pytest
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from planners import PlanningStatus
+from planners.kernels.spatial_track import overlap
 from planners.spatial.panel import Panel
 from planners.spatial.path import Path
 from planners.spatial.planning import PLANNERS, plan
@@ -314,6 +315,9 @@ def test_a_dead_end_of_thick_links_counts_their_radius_and_names_the_joint_limit
     a, b = result.failure.joints
     link = a + np.linspace(0.0, 1.0, 2001)[:, None] * (b - a)
     assert ((link > low - 4.0) & (link < high + 4.0)).all(axis=1).any()
+    # How far the link is from being free is how deep its axis is in the box that its radius is added to.
+    thin, thick = (overlap(*a, *b, np.array([[low - grown, high + grown]]), 0)[0] for grown in (0.0, 4.0))
+    assert result.failure.depth == pytest.approx(thick) and thin < thick - 1.0
 
 
 def test_a_track_that_only_grows_is_a_dead_end_even_without_obstacles():
