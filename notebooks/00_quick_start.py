@@ -13,9 +13,10 @@
 # %% [markdown]
 # # Quick start: a duct, a plan, and two verdicts
 #
-# How does an arm of a few long, rigid links get through a duct that they barely fit in? `plan` finds the way of
-# all joints in a fraction of a second; an exact checker says that no link is ever in a wall; and a simulation
-# with real walls says whether the links merely pinched them. Five minutes, from an empty page to both verdicts.
+# How does an arm of a few long, rigid links get through a duct that they barely fit in? `plan` finds the way
+# of all joints in a fraction of a second; an exact checker says that no link is ever in a wall; and a
+# simulation with real walls says whether the links merely pinched them. Five minutes, from an empty page to
+# both verdicts.
 
 # %%
 import matplotlib.pyplot as plt
@@ -88,7 +89,9 @@ plt.show()
 
 # %%
 report = validate(motion, duct, arm)
-print(f"valid: {report.valid}; nearest to a wall {report.clearance:.3f} mm, in walls {report.penetration:g} mm")
+print(
+    f"valid: {report.valid}; nearest to a wall {report.clearance:.3f} mm, in walls {report.penetration:g} mm"
+)
 narrow = Maze.from_corridors(centreline, 95.0, name="narrower", units="mm")
 for fault in validate(motion, narrow, arm).faults:
     print("narrower:", fault.message)
@@ -97,8 +100,8 @@ for fault in validate(motion, narrow, arm).faults:
 # ## The simulated run
 #
 # `simulate_motion` drives an arm with masses, motors and solid walls along the motion. Its verdict counts
-# each link at each pose: free, pinching a wall (to a thousandth of its length), or in collision. `clean` means
-# that nothing was worse than a pinch and no wall had to push.
+# each link at each pose: free, pinching a wall (to a thousandth of its length), or in collision. `clean`
+# means that nothing was worse than a pinch and no wall had to push.
 
 # %%
 run = simulate_motion(motion, duct, arm)

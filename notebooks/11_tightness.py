@@ -14,10 +14,10 @@
 # # How tight is tight?
 #
 # What does a longer link cost, and what does it save? The index $I$, a link's length over that of the longest
-# rod that passes, says how tight a task is. With it the number of links falls as $1 / I$, joints turn farther,
-# and an arm whose joints keep to a path fails early, from about 0.4 on. Our planners come to $I$ > 0.99 through
-# U-turns. Where a bend to one side closely follows one to the other, the joints behind a link have to follow on
-# its track, and in the S-bend below ours end at 0.75.
+# rod that passes, says how tight a task is. With it the number of links falls as $1 / I$, joints turn
+# farther, and an arm whose joints keep to a path fails early, from about 0.4 on. Our planners come to $I$ >
+# 0.99 through U-turns. Where a bend to one side closely follows one to the other, the joints behind a link
+# have to follow on its track, and in the S-bend below ours end at 0.75.
 
 # %%
 import time
@@ -95,7 +95,9 @@ ROWS = {
     "joint speed\n(deg per px of travel)": lambda trial: np.degrees(trial.joint_speed),
     "time (ms)": lambda trial: 1e3 * trial.seconds,
 }
-figure, every = plt.subplots(5, 3, figsize=(10.0, 9.2), sharex=True, sharey="row", height_ratios=(0.7, *[1] * 4))
+figure, every = plt.subplots(
+    5, 3, figsize=(10.0, 9.2), sharex=True, sharey="row", height_ratios=(0.7, *[1] * 4)
+)
 for column, name in zip(every.T, MAZES, strict=True):
     for place, (planner, (_, colour, marker)) in enumerate(PLANNERS.items()):
         pairs = list(zip(INDICES, trials[name, planner], strict=True))
@@ -105,7 +107,9 @@ for column, name in zip(every.T, MAZES, strict=True):
         column[0].plot(failed, [place] * len(failed), "x", color="#b0b4ba", markersize=4)
         for axes, figure_of in zip(column[1:], ROWS.values(), strict=True):
             values = [figure_of(trial) for _, trial in passed]
-            axes.plot([i for i, _ in passed], values, marker=marker, color=colour, markersize=4, linewidth=1.2)
+            axes.plot(
+                [i for i, _ in passed], values, marker=marker, color=colour, markersize=4, linewidth=1.2
+            )
     for axes in column:
         axes.axvline(best[name].index, color="#6b7078", linewidth=0.9, linestyle="--")
         axes.grid(color="#e3e5e8", linewidth=0.6)
@@ -131,5 +135,7 @@ plt.show()
 for name, result in best.items():
     loose = trials[name, "track"][INDICES.index(0.25)]
     tight, least = result.motion, result.fewest
-    print(f"{MAZES[name]}: {loose.n_links} links at I = 0.25, {tight.n_links} at {result.index:.2f};", end=" ")
+    print(
+        f"{MAZES[name]}: {loose.n_links} links at I = 0.25, {tight.n_links} at {result.index:.2f};", end=" "
+    )
     print(f"fewest {least.n_links}, with {least.link_length:.0f} px")
