@@ -14,9 +14,9 @@
 # # Learning from the expert
 #
 # What does a planner that solves every task give to a learner? Demonstrations. A small network that imitates
-# it comes through a U-turn after two of them and some seconds on one core; PPO takes minutes for the same,
-# even if its episodes start along a planned motion. Noise in the demonstrations matters: they then show how
-# to come back, so the pupil comes through with pushes under which the plan alone is lost.
+# it comes through a U-turn after two of them and some seconds on one core; PPO takes a minute or two for the
+# same, and only if its episodes start along a planned motion. The demonstrations have noise, so they show how
+# to come back: the pupil comes through with pushes under which the plan alone is lost.
 
 # %%
 import tempfile
@@ -146,7 +146,7 @@ for (name, policy), colour in zip(list(rows.items())[:4], COLOURS, strict=True):
     print(f"{name}: " + ", ".join(f"{share:.0f} %" for share in shares))
 axes.set(xlabel="noise, in shares of the largest action", ylabel="episodes that arrive (%)", ylim=(-4, 104))
 axes.grid(color="#e3e5e8", linewidth=0.6)
-axes.legend(loc="lower left")
+axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.02))
 plt.show()
 
 # %% [markdown]
