@@ -13,10 +13,10 @@
 # %% [markdown]
 # # From a floor plan to a robot
 #
-# How does a map of one's own become a trajectory that a real controller runs? In four calls: `read_map` makes a
-# maze of a ROS map, an image, or a drawing (SVG, DXF, GeoJSON), and never makes free what is not; `plan` finds
-# the motion; `time_parametrise` gives it time within the limits of the joints; `save_export` checks it once
-# more and writes it for ROS 2. The map here is drawn by the notebook itself, as a scan would have been.
+# How does a map of one's own become a trajectory that a real controller runs? In four calls: `read_map` makes
+# a maze of a ROS map, an image, or a drawing (SVG, DXF, GeoJSON), and never makes free what is not; `plan`
+# finds the motion; `time_parametrise` gives it time within the limits of the joints; `save_export` checks it
+# once more and writes it for ROS 2. The map here is drawn by the notebook itself, as a scan would have been.
 
 # %%
 import tempfile
@@ -38,13 +38,13 @@ folder = Path(tempfile.mkdtemp())
 # %% [markdown]
 # ## The scan
 #
-# A plant room of 8 m by 6 m, at 2 cm to a pixel: walls and machines are black, what is free is white, and what
-# nobody has seen is grey. Beside the picture a ROS map has a small file that says what its pixels mean.
+# A plant room of 8 m by 6 m, at 2 cm to a pixel: walls and machines are black, what is free is white, and
+# what nobody has seen is grey. Beside the picture a ROS map has a small file that says what its pixels mean.
 
 # %%
 FREE, WALL, UNKNOWN, RESOLUTION = 254, 0, 205, 0.02
 MACHINES = [(1.0, 0.0, 1.2, 4.9), (2.3, 1.2, 2.5, 6.0), (2.5, 1.2, 4.6, 1.4), (3.6, 2.5, 5.8, 2.7)]
-MACHINES += [(5.6, 0.0, 5.8, 2.6), (3.6, 3.8, 7.0, 4.0), (6.9, 1.1, 7.1, 4.0)]
+MACHINES += [(5.6, 0.0, 5.8, 2.6), (3.6, 3.8, 7.1, 4.0), (6.9, 1.1, 7.1, 3.9)]
 SLANTED = [(2.5, 3.1), (3.0, 3.6), (2.5, 4.4)]
 TANKS = [(4.4, 5.0, 0.45), (6.3, 5.2, 0.35), (3.2, 5.4, 0.3)]
 
@@ -69,3 +69,95 @@ image.save(folder / "plant.png")
     "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
 )
 image
+
+# %% [markdown]
+# ## The maze
+#
+# What nobody has seen counts as a wall, and the steps of pixels along slanted walls become straight lines on
+# the side of the wall: by at most `tolerance` (half a pixel, if nothing else is said) the free space shrinks,
+# and nowhere it grows. A map does not say where the arm stands nor where it should go: that is read off the
+# picture, in metres.
+
+# %%
+reading = read_map(folder / "plant.yaml", MapOptions())
+for note in reading.notes:
+    print("-", note)
+print(f"walls moved into the free space by up to {1e3 * reading.moved:.1f} mm")
+room = reading.maze(base_pose=(0.5, 0.1, np.pi / 2), goal=(7.5, 0.6), goal_radius=0.1)
+print(room, "in", room.units)
+
+# %% [markdown]
+# ## The plan
+#
+# Links of 1 m, 6 cm thick, in aisles of 1 m. Poses at 35 % (red), 65 % (violet) and the end (blue).
+
+# %%
+arm = ArmSpec(link_length=1.0, link_radius=0.03)
+result = plan(room, arm)
+motion, report = result.motion, result.report
+print(f"{result.status} in {1e3 * sum(result.timings.values()):.0f} ms: {motion}")
+print(f"nearest to a wall {1e3 * report.clearance:.1f} mm")
+figure, axes = plt.subplots(figsize=(8.0, 6.0))
+draw_walls(axes, room)
+draw_ends(axes, room)
+draw_stages(axes, motion.joints)
+axes.set(xticks=range(9), yticks=range(7), xlabel="x (m)", ylabel="y (m)")
+plt.show()
+
+# %% [markdown]
+# ## The trajectory
+#
+# A motion has no time. `time_parametrise` gives it the shortest that speeds and accelerations of joints and
+# feed allow, from rest to rest (by [TOPP-RA](https://hungpham2511.github.io/toppra/)), with corners rounded
+# by less than the pinch tolerance. Mostly the feed is the limit; in the turns the joints are.
+
+# %%
+limits = TrajectoryLimits(
+    joint_speed=np.radians(30.0), joint_acceleration=np.radians(90.0), feed_speed=0.25, feed_acceleration=0.5
+)
+trajectory = time_parametrise(motion, limits, rate=50.0, units=room.units)
+print(f"{trajectory}; the feed alone would take {motion.feed[-1] / 0.25:.1f} s")
+figure, every = plt.subplots(2, 1, figsize=(9.6, 4.4), sharex=True)
+every[0].plot(trajectory.time, trajectory.feed_velocity, color="#1f5fae")
+every[0].axhline(limits.feed_speed, color="#d73027", linewidth=1.0, linestyle="--")
+every[0].set(ylabel="feed (m/s)", ylim=(0.0, None))
+speeds = np.degrees(trajectory.joint_velocities)
+every[1].plot(trajectory.time, speeds, linewidth=0.8)
+for sign in (-1.0, 1.0):
+    every[1].axhline(sign * np.degrees(limits.joint_speed), color="#d73027", linewidth=1.0, linestyle="--")
+every[1].set(xlabel="time (s)", ylabel="joints (deg/s)", xlim=(0.0, trajectory.duration))
+plt.show()
+
+# %% [markdown]
+# ## To the robot
+#
+# Before a byte is written the trajectory is checked as a motion of its own, between its samples as a
+# controller drives them; what touches a wall by more than a pinch is refused. The YAML is what `ros2 topic
+# pub` takes as a `trajectory_msgs/msg/JointTrajectory`; the URDF describes the arm with the same joint names.
+# Others are CSV, JSON, NPZ, GIF, MP4 and a page to play.
+
+# %%
+message = export_bytes(motion, room, arm, "ros2-yaml", limits, rate=50.0).decode()
+(folder / "arm.yaml").write_text(message)
+print(message[:700])
+
+# %%
+robot = export_bytes(motion, room, arm, "urdf", limits).decode()
+(folder / "arm.urdf").write_text(robot)
+print(robot[:900])
+print({path.name: f"{path.stat().st_size / 1024:.0f} kB" for path in sorted(folder.iterdir())})
+
+# %% [markdown]
+# On a robot:
+#
+#     ros2 topic pub --once /arm/joint_trajectory trajectory_msgs/msg/JointTrajectory "$(cat arm.yaml)"
+#
+# ## The same without Python
+#
+#     hrsnake import plant.yaml --base 0.5,0.1,90 --goal 7.5,0.6 --goal-radius 0.1 --out plant.geojson
+#     hrsnake plan plant.geojson --link-length 1 --link-radius 0.03 --out m.npz
+#     hrsnake export plant.geojson m.npz --link-radius 0.03 --joint-speed 30 --out arm.yaml
+#
+# A drawing does as well: `read_map("plan.svg")` or `.dxf` takes closed outlines as free space and what is in
+# them as walls, or layers by name (`MapOptions(walls=("WALLS",), base=("BASE",))`). `hrsnake studio` is a
+# page on which to do all this with the mouse.

@@ -17,7 +17,9 @@ def outputs(notebook):
 
 
 def title_of(path):
-    return next(line for line in path.read_text().splitlines() if line.startswith("# # ")).removeprefix("# # ")
+    return next(line for line in path.read_text().splitlines() if line.startswith("# # ")).removeprefix(
+        "# # "
+    )
 
 
 def row_of(path):
