@@ -137,7 +137,7 @@ def pushed(action, noise, rng):
     return np.clip(action + noise * rng.standard_normal(action.shape), -1.0, 1.0).astype(np.float32)
 
 
-NOISES = (0.0, 0.1, 0.2, 0.4, 0.7, 1.0)
+NOISES = (0.0, 0.1, 0.3, 0.6, 1.0)
 COLOURS = ("#4b5058", "#6db3ea", "#1f5fae", "#e67700")
 figure, axes = plt.subplots(figsize=(9.6, 3.2))
 for (name, policy), colour in zip(list(rows.items())[:4], COLOURS, strict=True):

@@ -31,7 +31,7 @@ def row_of(path):
 def figures_in(text):
     """Return the paper's figures that a title or the index names, a range with all between its ends."""
     numbers = [int(number) for number in re.findall(r"\d+", text)]
-    return list(range(numbers[0], numbers[-1] + 1)) if " to " in text else numbers
+    return list(range(numbers[0], numbers[-1] + 1)) if numbers and " to " in text else numbers
 
 
 def test_there_are_notebooks():
