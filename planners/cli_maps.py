@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import shlex
 from pathlib import Path
@@ -86,8 +87,8 @@ def import_command(
         typer.Option(
             "--tolerance",
             rich_help_panel=SIZES,
-            help="How far walls may move into the free space to become simpler, in maze units; never the other "
-            "way. By default 1.5 pixels, or 1e-4 of an outline's size; 0 keeps every corner.",
+            help="How far walls may move into the free space to become simpler, in maze units; never "
+            "the other way. By default 1.5 pixels, or 1e-4 of an outline's size; 0 keeps every corner.",
         ),
     ] = None,
     resolution: Annotated[
@@ -161,7 +162,7 @@ def import_command(
 
     A ROS map in mm:  hrsnake import map.yaml --units mm --base 500,500,0 --goal 4000,2500 --out map.geojson
 
-    A CAD drawing:  hrsnake import duct.dxf --walls WALLS --base-layer BASE --goal-layer GOAL --out duct.geojson
+    A CAD drawing:  hrsnake import duct.dxf --walls WALLS --base-layer BASE --goal-layer GOAL --out d.geojson
     """
     check_output(out, (".geojson", ".json"))
     check_output(picture, PICTURES)
@@ -181,17 +182,16 @@ def import_command(
         wall_thickness=wall_thickness,
     )
     base_pose, place = _base_pose(base), _goal(goal)
-    reading = read_map(source, options)
+    reading = _with_ends(read_map(source, options), base_pose, place, goal_radius)
     try:
-        maze, wrong = reading.maze(base_pose=base_pose, goal=place, goal_radius=goal_radius), None
+        maze, wrong = reading.maze(), None
     except InputError as error:
         maze, wrong = None, error
     if picture is not None:
         from hrsnake_env.maps.picture import draw_reading
 
         draw_reading(reading, picture, maze)
-    given = base_pose is not None or reading.base_pose is not None
-    given = given and (place is not None or reading.goal is not None)
+    given = reading.base_pose is not None and reading.goal is not None
     if wrong is not None and (out is not None or given):  # the picture shows what is wrong
         raise wrong
     if maze is not None and out is not None:
@@ -231,6 +231,22 @@ def _goal(text: str | None) -> tuple[float, float] | None:
         return None
     x, y = _numbers(text, "--goal", "X,Y")
     return x, y
+
+
+def _with_ends(
+    reading: MapReading,
+    base_pose: tuple[float, float, float] | None,
+    goal: tuple[float, float] | None,
+    goal_radius: float | None,
+) -> MapReading:
+    """Return the reading with the base and the goal that were given, instead of the map's."""
+    radius = goal_radius if goal_radius is not None or goal is not None else reading.goal_radius
+    return dataclasses.replace(
+        reading,
+        base_pose=reading.base_pose if base_pose is None else base_pose,
+        goal=reading.goal if goal is None else goal,
+        goal_radius=radius,
+    )
 
 
 def _straight_way(maze: Maze) -> float:

@@ -13,17 +13,31 @@ import dataclasses
 import re
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hrsnake_env.arm import ArmSpec, FloatArray
+from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners.checks.tolerances import PINCH_TOLERANCE, STEP_LIMIT
-from planners.export.kinematics import Kinematics, kinematics_of
+from planners.export.kinematics import Kinematics, PlanarKinematics, SpatialKinematics
 from planners.export.timing import time_parametrise
 from planners.export.trajectory import DEFAULT_RATE, ExportRefused, Trajectory, TrajectoryLimits
 from planners.problem import Fault, Motion, Progress, ValidationReport
+from planners.spatial.problem import SpatialMotion
+from planners.spatial.validation import validate as validate_in_space
+from planners.spatial.workspace import Workspace
 from planners.validation import validate
 
-__all__ = ["LIMIT_TOLERANCE", "check_trajectory", "largest_shares", "safe_trajectory", "sampled_motion"]
+IntArray = NDArray[np.int64]
+
+__all__ = [
+    "LIMIT_TOLERANCE",
+    "check_motion",
+    "check_trajectory",
+    "largest_shares",
+    "safe_trajectory",
+    "sampled_motion",
+]
 
 LIMIT_TOLERANCE = 1e-3
 """By how much a limit may be exceeded, as a share of it."""
@@ -39,29 +53,22 @@ DEVIATIONS = (1.0, 0.5, 0.25, 0.1)
 get, not how far they are off, which is more; so the first is often good enough."""
 
 
-def sampled_motion(trajectory: Trajectory) -> tuple[Motion, FloatArray]:
+def sampled_motion(trajectory: Trajectory) -> tuple[Motion | SpatialMotion, FloatArray]:
     """Return poses along the cubics that a controller drives, and their times.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-        In the plane.
 
     Returns
     -------
-    motion : Motion
+    motion : Motion or SpatialMotion
         So many poses that feed and angles between two are linear but for what moves a joint by `CHORD`.
     times : array, shape (n_poses,)
         In s.
     """
-    length = trajectory.link_length
-    scale = np.array([length, *[1.0] * trajectory.n_links])
+    length, planar = trajectory.link_length, trajectory.joint_angles.ndim == 2
+    kind = PlanarKinematics if planar else SpatialKinematics
+    kinematics = kind(n_links=trajectory.n_links, base_pose=trajectory.base_pose, link_length=length)
     positions, velocities, _ = trajectory.table()
+    scale = np.array([length, *[1.0] * (positions.shape[1] - 1)])
     positions, velocities = positions / scale, velocities / scale
-    arm = Motion.from_configurations(
-        trajectory.feed[:1], trajectory.joint_angles[:1], length, trajectory.base_pose
-    )
-    kinematics = kinematics_of(arm)
     steps = np.diff(trajectory.time)
     counts = _subdivisions(kinematics, positions, velocities, steps)
     owner = np.repeat(np.arange(len(steps)), counts)
@@ -69,25 +76,28 @@ def sampled_motion(trajectory: Trajectory) -> tuple[Motion, FloatArray]:
     shares = number / counts[owner]
     rows = np.concatenate([_cubic(positions, velocities, steps, owner, shares), positions[-1:]])
     times = np.append(trajectory.time[:-1][owner] + shares * steps[owner], trajectory.time[-1])
-    motion = Motion.from_configurations(length * rows[:, 0], rows[:, 1:], length, trajectory.base_pose)
-    return motion, times
+    if planar:
+        feed = length * rows[:, 0]
+        return Motion.from_configurations(feed, rows[:, 1:], length, trajectory.base_pose), times
+    return SpatialMotion.from_joints(length * kinematics.joints(rows), length, trajectory.base_pose), times
 
 
 def _cubic(
-    positions: FloatArray, velocities: FloatArray, steps: FloatArray, owner: FloatArray, share: FloatArray
+    positions: FloatArray, velocities: FloatArray, steps: FloatArray, owner: IntArray, share: FloatArray
 ) -> FloatArray:
     """Evaluate the cubics at shares of the steps, shape (n,) -> (n, dof)."""
     t, h = share[:, None], steps[owner][:, None]
     change = positions[owner + 1] - positions[owner]
     start, end = h * velocities[owner], h * velocities[owner + 1]
     return np.asarray(
-        positions[owner] + t * (start + t * (3.0 * change - 2.0 * start - end + t * (start + end - 2.0 * change)))
+        positions[owner]
+        + t * (start + t * (3.0 * change - 2.0 * start - end + t * (start + end - 2.0 * change)))
     )
 
 
 def _subdivisions(
     kinematics: Kinematics, positions: FloatArray, velocities: FloatArray, steps: FloatArray
-) -> FloatArray:
+) -> IntArray:
     """Find into how many pieces each step has to be cut, shape (n_steps,)."""
     each = np.arange(len(steps))
     places = kinematics.joints(positions)
@@ -135,7 +145,7 @@ def largest_shares(trajectory: Trajectory, limits: TrajectoryLimits) -> dict[str
 
 def check_trajectory(
     trajectory: Trajectory,
-    maze: Maze,
+    maze: Maze | Workspace,
     arm: ArmSpec | None = None,
     limits: TrajectoryLimits | None = None,
     progress: Progress | None = None,
@@ -145,8 +155,8 @@ def check_trajectory(
     Parameters
     ----------
     trajectory : Trajectory
-        In the plane, from the base of this maze.
-    maze : Maze
+        From the base of this maze.
+    maze : Maze or Workspace
         With the exact walls.
     arm : ArmSpec, optional
         Gives link radius and joint limit. By default thin links without joint limits.
@@ -167,7 +177,7 @@ def check_trajectory(
         If the trajectory belongs to another maze or another arm.
     """
     motion, times = sampled_motion(trajectory)
-    report = validate(motion, maze, arm, progress)
+    report = _validated(motion, maze, arm, progress)
     allowed = PINCH_TOLERANCE * trajectory.link_length
     faults = [
         _timed(fault, trajectory, times)
@@ -176,6 +186,40 @@ def check_trajectory(
     ]
     faults += _timing_faults(trajectory, limits)
     return dataclasses.replace(report, faults=tuple(faults))
+
+
+def check_motion(
+    motion: Motion | SpatialMotion,
+    maze: Maze | Workspace,
+    arm: ArmSpec | None = None,
+    progress: Progress | None = None,
+) -> ValidationReport:
+    """Check a motion before it is exported.
+
+    Raises
+    ------
+    InputError
+        If the motion is of another maze or arm, or not of its kind.
+    ExportRefused
+        If it is not valid.
+    """
+    report = _validated(motion, maze, arm, progress)
+    if not report.valid:
+        raise ExportRefused(
+            f"The motion is not valid in '{maze.name}', so it is not exported: {report.faults[0].message}",
+            report,
+        )
+    return report
+
+
+def _validated(
+    motion: Motion | SpatialMotion, maze: Maze | Workspace, arm: ArmSpec | None, progress: Progress | None
+) -> ValidationReport:
+    if isinstance(motion, Motion) and isinstance(maze, Maze):
+        return validate(motion, maze, arm, progress)
+    if isinstance(motion, SpatialMotion) and isinstance(maze, Workspace):
+        return validate_in_space(motion, maze, arm, progress)
+    raise InputError("Expected a motion in the plane with a maze, or one in space with a workspace.")
 
 
 def _timed(fault: Fault, trajectory: Trajectory, times: FloatArray) -> Fault:
@@ -197,11 +241,11 @@ def _timing_faults(trajectory: Trajectory, limits: TrajectoryLimits | None) -> l
     for sample, when in ((0, "starts"), (-1, "ends")):
         speed = float(np.abs(velocities[sample]).max())
         if speed > 1e-9:
-            message = f"The trajectory {when} at a speed of {speed:.3g} rad or link lengths per s, not at rest."
-            pose = sample % trajectory.n_points
-            faults.append(
-                Fault(kind="rest", message=message, pose=pose, link=None, place=None, amount=speed)
+            message = (
+                f"The trajectory {when} at a speed of {speed:.3g} rad or link lengths per s, not at rest."
             )
+            pose = sample % trajectory.n_points
+            faults.append(Fault(kind="rest", message=message, pose=pose, link=None, place=None, amount=speed))
     if limits is not None:
         shares = largest_shares(trajectory, limits)
         worst = max(shares, key=lambda name: shares[name])
@@ -213,8 +257,8 @@ def _timing_faults(trajectory: Trajectory, limits: TrajectoryLimits | None) -> l
 
 
 def safe_trajectory(
-    motion: Motion,
-    maze: Maze,
+    motion: Motion | SpatialMotion,
+    maze: Maze | Workspace,
     arm: ArmSpec | None = None,
     limits: TrajectoryLimits | None = None,
     *,
@@ -225,10 +269,10 @@ def safe_trajectory(
 
     Parameters
     ----------
-    motion : Motion
+    motion : Motion or SpatialMotion
         Valid in this maze.
     maze, arm
-        As in `planners.validation.validate`.
+        As in `check_trajectory`.
     limits : TrajectoryLimits, optional
         By default those that the class names.
     rate : float
@@ -252,13 +296,7 @@ def safe_trajectory(
     """
     limits = TrajectoryLimits() if limits is None else limits
     limits.arrays(motion.link_length, 1)
-    before = validate(motion, maze, arm, progress)
-    if not before.valid:
-        raise ExportRefused(
-            f"The motion is not valid in '{maze.name}', so it is not exported: {before.faults[0].message}",
-            before,
-        )
-    report = before
+    report = check_motion(motion, maze, arm, progress)
     for share in DEVIATIONS:
         deviation = share * PINCH_TOLERANCE
         trajectory = time_parametrise(

@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from hrsnake_env.arm import FloatArray
@@ -188,7 +189,7 @@ def _least_feed(feed: BSpline, breaks: FloatArray) -> FloatArray:
 
 
 def _deviations(
-    line: Polyline, kinematics: Kinematics, spline: BSpline, breaks: FloatArray, pieces: FloatArray
+    line: Polyline, kinematics: Kinematics, spline: BSpline, breaks: FloatArray, pieces: NDArray[np.int64]
 ) -> FloatArray:
     """Measure how far joints are off in pieces of the path, in link lengths, shape (n_pieces,)."""
     shares = (np.arange(SAMPLES) + 0.5) / SAMPLES

@@ -82,7 +82,9 @@ def time_parametrise(
         If toppra is not installed, the rate or the limits are out of range, or the motion does not move.
     """
     if not is_number(rate) or not 0.1 <= rate <= LARGEST_RATE:
-        raise InputError(f"Expected a rate between 0.1 and {LARGEST_RATE:g} samples per second, got {rate!r}.")
+        raise InputError(
+            f"Expected a rate between 0.1 and {LARGEST_RATE:g} samples per second, got {rate!r}."
+        )
     if not is_number(deviation) or not 1e-9 <= deviation <= 1.0:
         raise InputError(f"Expected a deviation between 1e-9 and 1 link lengths, got {deviation!r}.")
     limits = TrajectoryLimits() if limits is None else limits

@@ -170,7 +170,9 @@ class Trajectory:
                 raise InputError(f"Expected a trajectory of finite numbers, got NaN or infinity in {name}.")
         shape = self.joint_angles.shape
         if len(shape) not in (2, 3) or 0 in shape or shape[2:] not in ((), (2,)):
-            raise InputError(f"Expected joint_angles with shape (n, n_links) or (n, n_links, 2), got {shape}.")
+            raise InputError(
+                f"Expected joint_angles with shape (n, n_links) or (n, n_links, 2), got {shape}."
+            )
         for name in names[:-1]:
             wanted = shape if name.startswith("joint") else shape[:1]
             if getattr(self, name).shape != wanted:
