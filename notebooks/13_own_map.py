@@ -15,12 +15,13 @@
 #
 # How does a map of one's own become a trajectory that a real controller runs? In four calls: `read_map` makes
 # a maze of a ROS map, an image, or a drawing (SVG, DXF, GeoJSON), and never makes free what is not; `plan`
-# finds the motion; `time_parametrise` gives it time within the limits of the joints; `save_export` checks it
+# finds the motion; `time_parametrise` gives it time within the limits of the joints; `export_bytes` checks it
 # once more and writes it for ROS 2. The map here is drawn by the notebook itself, as a scan would have been.
 
 # %%
 import tempfile
 from pathlib import Path
+from xml.etree import ElementTree
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -29,7 +30,7 @@ from PIL import Image, ImageDraw
 from hrsnake_env import ArmSpec
 from hrsnake_env.maps import MapOptions, read_map
 from planners import plan
-from planners.export import TrajectoryLimits, export_bytes, time_parametrise
+from planners.export import TrajectoryLimits, check_trajectory, export_bytes, time_parametrise
 from planners.figures import STYLE, draw_ends, draw_stages, draw_walls
 
 plt.rcParams.update(STYLE)
@@ -119,6 +120,7 @@ limits = TrajectoryLimits(
 )
 trajectory = time_parametrise(motion, limits, rate=50.0, units=room.units)
 print(f"{trajectory}; the feed alone would take {motion.feed[-1] / 0.25:.1f} s")
+print(f"keeps to walls and limits: {check_trajectory(trajectory, room, arm, limits).valid}")
 figure, every = plt.subplots(2, 1, figsize=(9.6, 4.4), sharex=True)
 every[0].plot(trajectory.time, trajectory.feed_velocity, color="#1f5fae")
 every[0].axhline(limits.feed_speed, color="#d73027", linewidth=1.0, linestyle="--")
@@ -133,26 +135,32 @@ plt.show()
 # %% [markdown]
 # ## To the robot
 #
-# Before a byte is written the trajectory is checked as a motion of its own, between its samples as a
-# controller drives them; what touches a wall by more than a pinch is refused. The YAML is what `ros2 topic
-# pub` takes as a `trajectory_msgs/msg/JointTrajectory`; the URDF describes the arm with the same joint names.
-# Others are CSV, JSON, NPZ, GIF, MP4 and a page to play.
+# Before a byte is written the trajectory is checked as above, between its samples, too; what goes into a wall
+# by more than a pinch is refused. The YAML is a `trajectory_msgs/msg/JointTrajectory` with the feed in
+# metres; the URDF describes the arm with the same joint names. Others are CSV, JSON, NPZ, GIF, MP4 and a page
+# to play.
 
 # %%
-message = export_bytes(motion, room, arm, "ros2-yaml", limits, rate=50.0).decode()
-(folder / "arm.yaml").write_text(message)
-print(message[:700])
+for name, form in (("arm.yaml", "ros2-yaml"), ("arm.urdf", "urdf"), ("arm.csv", "csv")):
+    (folder / name).write_bytes(export_bytes(motion, room, arm, form, limits, rate=50.0))
+    print(f"{name}: {(folder / name).stat().st_size / 1024:.0f} kB")
+lines = (folder / "arm.yaml").read_text().splitlines()
+first = lines.index("points:")
+print(*lines[:7], "...", *(line[:100] for line in lines[first : first + 6]), sep="\n")
 
 # %%
-robot = export_bytes(motion, room, arm, "urdf", limits).decode()
-(folder / "arm.urdf").write_text(robot)
-print(robot[:900])
-print({path.name: f"{path.stat().st_size / 1024:.0f} kB" for path in sorted(folder.iterdir())})
+joints = ElementTree.parse(folder / "arm.urdf").getroot().findall("joint")
+for joint in (joints[1], joints[2], joints[-1]):
+    print(
+        joint.get("name"),
+        joint.get("type"),
+        dict(joint.find("limit").attrib) if joint.find("limit") is not None else "",
+    )
 
 # %% [markdown]
-# On a robot:
+# On a robot (`--yaml-file` is there since ROS 2 Kilted; as an argument a shell takes 128 kB at most):
 #
-#     ros2 topic pub --once /arm/joint_trajectory trajectory_msgs/msg/JointTrajectory "$(cat arm.yaml)"
+#     ros2 topic pub --once /arm/joint_trajectory trajectory_msgs/msg/JointTrajectory --yaml-file arm.yaml
 #
 # ## The same without Python
 #
