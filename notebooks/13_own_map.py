@@ -34,7 +34,8 @@ from planners.export import TrajectoryLimits, check_trajectory, export_bytes, ti
 from planners.figures import STYLE, draw_ends, draw_stages, draw_walls
 
 plt.rcParams.update(STYLE)
-folder = Path(tempfile.mkdtemp())
+files = tempfile.TemporaryDirectory()
+folder = Path(files.name)
 
 # %% [markdown]
 # ## The scan
@@ -145,17 +146,14 @@ for name, form in (("arm.yaml", "ros2-yaml"), ("arm.urdf", "urdf"), ("arm.csv", 
     (folder / name).write_bytes(export_bytes(motion, room, arm, form, limits, rate=50.0))
     print(f"{name}: {(folder / name).stat().st_size / 1024:.0f} kB")
 lines = (folder / "arm.yaml").read_text().splitlines()
-first = lines.index("points:")
-print(*lines[:7], "...", *(line[:100] for line in lines[first : first + 6]), sep="\n")
+print(*lines[:6], "...", *(f"{line[:90]} ..." for line in lines[-5:-2]), *lines[-2:], sep="\n")
 
 # %%
-joints = ElementTree.parse(folder / "arm.urdf").getroot().findall("joint")
-for joint in (joints[1], joints[2], joints[-1]):
-    print(
-        joint.get("name"),
-        joint.get("type"),
-        dict(joint.find("limit").attrib) if joint.find("limit") is not None else "",
-    )
+joints = {joint.get("name"): joint for joint in ElementTree.parse(folder / "arm.urdf").iter("joint")}
+for name in ("feed", "joint_0", "joint_17"):
+    limit = joints[name].find("limit")
+    print(f"{name}: {joints[name].get('type')}, up to {float(limit.get('velocity')):.4g} per s,", end=" ")
+    print(f"from {float(limit.get('lower')):.4g} to {float(limit.get('upper')):.4g}")
 
 # %% [markdown]
 # On a robot (`--yaml-file` is there since ROS 2 Kilted; as an argument a shell takes 128 kB at most):
@@ -166,8 +164,11 @@ for joint in (joints[1], joints[2], joints[-1]):
 #
 #     hrsnake import plant.yaml --base 0.5,0.1,90 --goal 7.5,0.6 --goal-radius 0.1 --out plant.geojson
 #     hrsnake plan plant.geojson --link-length 1.2 --link-radius 0.05 --out m.npz
-#     hrsnake export plant.geojson m.npz --link-radius 0.05 --joint-speed 30 --out arm.yaml
+#     hrsnake export plant.geojson m.npz --link-radius 0.05 --joint-speed 30 --feed-speed 0.25 --out arm.yaml
 #
 # A drawing does as well: `read_map("plan.svg")` or `.dxf` takes closed outlines as free space and what is in
 # them as walls, or layers by name (`MapOptions(walls=("WALLS",), base=("BASE",))`). `hrsnake studio` is a
 # page on which to do all this with the mouse.
+
+# %%
+files.cleanup()
