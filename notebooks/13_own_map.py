@@ -70,7 +70,10 @@ image.save(folder / "plant.png")
     f"image: plant.png\nresolution: {RESOLUTION}\norigin: [-0.4, -0.4, 0.0]\n"
     "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
 )
-image
+figure, axes = plt.subplots(figsize=(8.0, 5.9))
+axes.imshow(image, cmap="gray", vmin=0, vmax=255, extent=(-0.4, 8.4, -0.4, 6.4))
+axes.set(xlabel="x (m)", ylabel="y (m)")
+plt.show()
 
 # %% [markdown]
 # ## The maze
