@@ -25,7 +25,7 @@ import numpy as np
 from hrsnake_env.mazes import PAPER_LINK_LENGTHS
 
 STARTS, PLANS, CLIENTS, CROWD = 5, 15, 20, 60
-COMMAND = "import typer; from planners.cli_studio import studio_command; typer.run(studio_command)"
+COMMAND = ["-m", "planners.cli", "studio", "--no-browser", "--port", "0"]
 LENGTHS = np.linspace(380.0, 436.0, CLIENTS)
 """One for each client, by which its answer is known."""
 
@@ -34,7 +34,7 @@ LENGTHS = np.linspace(380.0, 436.0, CLIENTS)
 def studio(*options: str) -> Iterator[tuple[subprocess.Popen[str], int, float]]:
     """Start the studio; yield its process, its port and the moment of its start."""
     start = time.perf_counter()
-    words = [sys.executable, "-c", COMMAND, "--no-browser", "--port", "0", *options]
+    words = [sys.executable, *COMMAND, *options]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None
