@@ -25,7 +25,7 @@ import numpy as np
 from hrsnake_env.mazes import PAPER_LINK_LENGTHS
 
 STARTS, PLANS, CLIENTS, CROWD = 5, 15, 20, 60
-COMMAND = ["-m", "planners.cli", "studio", "--no-browser", "--port", "0"]
+COMMAND = ["-c", "from planners.cli import main; main()", "studio", "--no-browser", "--port", "0"]
 LENGTHS = np.linspace(380.0, 436.0, CLIENTS)
 """One for each client, by which its answer is known."""
 
