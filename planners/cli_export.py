@@ -74,8 +74,8 @@ def export_command(
 ) -> None:
     """Write a motion as a trajectory within limits of speed and acceleration, checked as the motion is.
 
-    `hrsnake export fig19 fig19.npz --out arm.csv` writes a table; `--out arm.yaml --metres-per-unit 0.001` what
-    `ros2 topic pub /TOPIC trajectory_msgs/msg/JointTrajectory "$(cat arm.yaml)"` takes; `--out arm.urdf` the arm.
+    `hrsnake export fig19 fig19.npz --out arm.csv` writes a table, `--out arm.yaml --metres-per-unit 0.001` a
+    ROS 2 trajectory_msgs/msg/JointTrajectory, `--out arm.urdf` the arm, `--out arm.mp4` a video.
     """
     name = format_for(out, format)
     check_output(out, (EXPORTS[name].ending, ".yml") if name == "ros2-yaml" else (EXPORTS[name].ending,))
@@ -105,7 +105,7 @@ def export_command(
     except ExportRefused as refusal:
         report = None if refusal.report is None else tables.validation_dict(refusal.report)
         data = {"format": name, "out": None, "reason": str(refusal), "validation": report}
-        print_outcome(as_json, data, lambda: print(refusal, file=sys.stderr))
+        print_outcome(as_json, data, lambda: print(data["reason"], file=sys.stderr))
         raise typer.Exit(NOT_CLEAN) from None
     data = _facts(made, moved, limits, name, out)
     print_outcome(as_json, data, lambda: _show(made, world, data))
@@ -151,11 +151,8 @@ def _show(made: Export, maze: Maze, data: dict[str, Any]) -> None:
             ),
         ]
     depth = made.report.penetration_between
-    verdict = (
-        "free of the walls"
-        if depth <= 0.0
-        else f"at most {depth:.3g} {maze.units} deep, within the tolerance"
-    )
+    deep = f"at most {depth:.3g} {maze.units} deep, within the tolerance"
+    verdict = "free of the walls" if depth <= 0.0 else deep
     rows.append(("walls", f"{verdict}; clearance {made.report.clearance:.3g} {maze.units}"))
     tables.show_rows(f"{EXPORTS[data['format']].title}: {maze.name}", rows)
     print(f"Written: {data['out']}")

@@ -1,4 +1,4 @@
-"""`hrsnake import` as a user meets it: what is printed, drawn and written, exit codes, one sentence for errors."""
+"""`hrsnake import` as a user meets it: what is printed, drawn and written, exit codes, errors."""
 
 import json
 import math

@@ -125,6 +125,8 @@ class _Reader:
 
     def outlines(self) -> Iterator[Outline]:
         """Yield what the model space shows."""
+        if self._weight(self.document.modelspace(), {}, ()) > MAX_ENTITIES:
+            raise InputError(f"Expected at most {MAX_ENTITIES:,} entities in '{self.name}', got more.")
         for entity in self.document.modelspace():
             yield from self._outlines(entity, "0", None, 0)
 
@@ -172,14 +174,26 @@ class _Reader:
             extra=kind in ("HATCH", "MPOLYGON"),
         )
 
+    def _weight(self, entities: Any, known: dict[str, int], under_way: tuple[str, ...]) -> int:
+        """Return how many entities there are after all blocks are inserted, those within themselves once."""
+        total = 0
+        for entity in entities:
+            total += 1
+            name = str(entity.dxf.get("name", "")).casefold() if entity.dxftype() == "INSERT" else ""
+            if not name or name in under_way or len(under_way) > MAX_DEPTH:
+                continue
+            if name not in known:
+                block = entity.block()
+                known[name] = 0 if block is None else self._weight(block, known, (*under_way, name))
+            total += max(1, entity.mcount) * known[name]
+        return total
+
     def _inserted(self, insert: Any, layer: str, colour: str | None, depth: int) -> Iterator[Outline]:
         block = insert.block()
         if block is None or block.block.dxf.get("flags", 0) & 4 or depth >= MAX_DEPTH:
             self.left["XREF" if block is not None and depth < MAX_DEPTH else "INSERT"] += 1
             return
         count = insert.mcount
-        if count * max(1, len(block)) > MAX_ENTITIES:
-            raise InputError(f"Expected at most {MAX_ENTITIES:,} entities in '{self.name}', got more.")
         for one in insert.multi_insert() if count > 1 else (insert,):
             try:
                 inside = list(one.virtual_entities())

@@ -12,7 +12,7 @@ from shapely.geometry import LineString, MultiPolygon, Polygon
 
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.maps.drawing import counted
-from hrsnake_env.maps.nesting import even_odd, filled, nested, polygons
+from hrsnake_env.maps.nesting import even_odd, filled, nested, odd, polygons
 from hrsnake_env.maps.tracing import Ring, Traced
 
 __all__ = ["free_space_of"]
@@ -140,7 +140,7 @@ def _thick(points: FloatArray, half: float) -> Area:
 
 
 def _material(thing: Sequence[Ring]) -> Area:
-    return shapely.symmetric_difference_all([filled(ring.points) for ring in thing])
+    return odd([filled(ring.points) for ring in thing])
 
 
 def _by_outline(rings: list[Ring]) -> list[list[Ring]]:

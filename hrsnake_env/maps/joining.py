@@ -33,15 +33,16 @@ def joined(lines: Sequence[FloatArray], gap: float) -> tuple[list[FloatArray], l
     open_lines : list of arrays, shape (n, 2)
     """
     ends = _snapped(np.array([point for line in lines for point in (line[0], line[-1])]).reshape(-1, 2), gap)
-    whole = []
+    whole: dict[tuple[object, ...], LineString] = {}
     for line, start, end in zip(lines, ends[::2], ends[1::2], strict=True):
         points = np.concatenate([[start], line, [end]])
         again = np.concatenate([[False], (points[1:] == points[:-1]).all(axis=1)])
         lost = (start == end).all() and len(line) < 3  # shorter than the gap: its ends are one
         if (~again).sum() >= 2 and not lost:
-            whole.append(LineString(points[~again]))
-    once = list(dict.fromkeys(line.normalize() for line in whole))
-    merged = _lines(shapely.line_merge(MultiLineString(once))) if once else []
+            sides = sorted([tuple(start), tuple(end)])
+            inner = sorted(map(tuple, np.round(line[1:-1] / (gap or 1.0)))) if len(line) > 2 else []
+            whole.setdefault((*sides, *inner), LineString(points[~again]))
+    merged = _lines(shapely.line_merge(MultiLineString(list(whole.values())))) if whole else []
     rings = [line for line in merged if line.is_closed]
     rest = [line for line in merged if not line.is_closed]
     if len(rest) > 1:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,7 +13,7 @@ from shapely.geometry import MultiPolygon, Polygon
 
 from hrsnake_env.arm import FloatArray
 
-__all__ = ["Nesting", "even_odd", "filled", "nested", "polygons"]
+__all__ = ["Nesting", "even_odd", "filled", "nested", "odd", "polygons"]
 
 
 def polygons(geometry: shapely.Geometry) -> list[Polygon]:
@@ -32,7 +33,12 @@ def even_odd(rings: Sequence[FloatArray]) -> MultiPolygon | Polygon:
     areas = [
         shapely.union_all(polygons(shapely.make_valid(Polygon(ring), method="linework"))) for ring in rings
     ]
-    return areas[0] if len(areas) == 1 else shapely.symmetric_difference_all(areas)
+    return odd(areas)
+
+
+def odd(areas: Sequence[shapely.Geometry]) -> MultiPolygon | Polygon:
+    """Return what an odd number of areas covers."""
+    return functools.reduce(shapely.symmetric_difference, areas)
 
 
 def filled(ring: FloatArray) -> MultiPolygon | Polygon:
@@ -104,8 +110,12 @@ def nested(rings: Sequence[FloatArray], is_wall: Sequence[bool], gap: float, thi
     obstacles = np.flatnonzero(~free & ~twice)
     tree = STRtree(areas[obstacles])
     rooms = []
-    for i in np.flatnonzero(free):
-        near = [j for j in obstacles[tree.query(areas[i], predicate="intersects")] if (i, j) not in around]
+    for i in np.flatnonzero(free).tolist():
+        near = [
+            j
+            for j in obstacles[tree.query(areas[i], predicate="intersects")].tolist()
+            if (i, j) not in around
+        ]
         rooms.append(shapely.difference(even_odd([rings[i]]), shapely.union_all(areas[near])))
     return Nesting(free_space=_apart(rooms, thickness), free=free, twice=twice, crossing=crossing)
 
@@ -120,8 +130,11 @@ def _relations(areas: np.ndarray, gap: float) -> tuple[np.ndarray, ...]:
     sliver = gap * np.minimum(shapely.length(areas[a]), shapely.length(areas[b]))
     size = shapely.area(areas)
     a_in_b, b_in_a = size[a] - common <= sliver, size[b] - common <= sliver
-    inner = np.concatenate([inner, a[a_in_b], b[b_in_a]])
-    outer = np.concatenate([outer, b[a_in_b], a[b_in_a]])
+    alike = size[outer] - size[inner] <= gap * shapely.length(areas[inner])
+    inner, outer = (
+        np.concatenate([inner, outer[alike], a[a_in_b], b[b_in_a]]),
+        np.concatenate([outer, inner[alike], b[a_in_b], a[b_in_a]]),
+    )
     both = set(zip(inner.tolist(), outer.tolist(), strict=True))
     twice = np.zeros(len(areas), dtype=bool)
     for i, j in both:

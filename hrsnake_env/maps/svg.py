@@ -268,18 +268,19 @@ def _outline(
     colours = [
         paint.hexrgb for paint in (shape.stroke, shape.fill) if paint is not None and paint.value is not None
     ]
-    return Outline(
-        strokes=tuple(
-            Stroke(
-                pieces=tuple(piece.transformed(matrix, offset) for piece in stroke.pieces),
-                closed=stroke.closed,
-            )
-            for stroke in strokes
-        ),
-        layer=layer or (own[0] if own else ""),
-        names=own + names,
-        colours=tuple(dict.fromkeys(colours)),
-    )
+    with np.errstate(all="ignore"):  # what is not finite is left out later, and said
+        return Outline(
+            strokes=tuple(
+                Stroke(
+                    pieces=tuple(piece.transformed(matrix, offset) for piece in stroke.pieces),
+                    closed=stroke.closed,
+                )
+                for stroke in strokes
+            ),
+            layer=layer or (own[0] if own else ""),
+            names=own + names,
+            colours=tuple(dict.fromkeys(colours)),
+        )
 
 
 def _strokes(segments: Any, closes: bool) -> Iterator[Stroke]:

@@ -1,7 +1,7 @@
 """Check trajectories as motions are checked: independently, and as a controller drives them.
 
-Between samples a controller goes along cubics through positions and velocities. So many poses are taken from
-these that what changes linearly between them is no farther from the cubics than `CHORD`; the exact checker
+Between samples a controller goes along cubics through positions and velocities. So many poses are taken
+from these that what changes linearly between them is no farther off than `CHORD`; the exact checker
 (`planners.validation`) then decides on these poses and on everything between them. A motion may get as deep as
 the pinch tolerance between its poses and not at them; of a trajectory no moment is more of a pose than any
 other, so it may get that deep at any. All other rules are the motion's.
@@ -49,8 +49,8 @@ STEP_SHARE = 0.8
 """Of the largest step between two poses: what is taken from the cubics stays below."""
 
 DEVIATIONS = (1.0, 0.5, 0.25, 0.1)
-"""How far the rounded path may be off, one after the other, in pinch tolerances. What counts is how deep links
-get, not how far they are off, which is more; so the first is often good enough."""
+"""How far the rounded path may be off, one after the other, in pinch tolerances. What counts is how deep
+links get, which is less than how far they are off; so the first is often good enough."""
 
 
 def sampled_motion(trajectory: Trajectory) -> tuple[Motion | SpatialMotion, FloatArray]:
@@ -168,7 +168,7 @@ def check_trajectory(
     Returns
     -------
     report : ValidationReport
-        As of a motion, but that links may be as deep as the pinch tolerance anywhere; messages name times. Two
+        As of a motion, but links may be as deep as the pinch tolerance anywhere; messages name times. Two
         more kinds of fault: "rest", if it does not start and end at rest, and "limits".
 
     Raises

@@ -16,8 +16,7 @@ from hrsnake_env.maze import Maze
 from planners.export.checking import check_motion, safe_trajectory
 from planners.export.ros import message_json, message_yaml
 from planners.export.tables import csv_bytes, json_bytes, npz_bytes
-from planners.export.timing import DEFAULT_RATE
-from planners.export.trajectory import Trajectory, TrajectoryLimits
+from planners.export.trajectory import DEFAULT_RATE, Trajectory, TrajectoryLimits
 from planners.export.units import metres_in
 from planners.export.urdf import urdf_bytes
 from planners.problem import Motion, Progress, ValidationReport

@@ -1,7 +1,7 @@
-"""What timing has to know of an arm: where its joints are, and what the feeder holds; in the plane and in space.
+"""What timing has to know of an arm, in the plane and in space: where its joints are, what the feeder holds.
 
-A configuration is a row (feed, angles): the feed in link lengths, the angles in rad. In the plane there is one
-per joint, in space there are two, yaw and pitch of a universal joint (`planners.spatial.kinematics`).
+A configuration is a row (feed, angles): the feed in link lengths, the angles in rad. In the plane there is
+one per joint, in space there are two, yaw and pitch of a universal joint (`planners.spatial.kinematics`).
 """
 
 from __future__ import annotations
@@ -56,11 +56,10 @@ class PlanarKinematics:
         behind = past < 0.0
         headings[behind] = 0.0
         result = configurations.copy()
-        # Only where something is held: elsewhere angles stay as they are to the last bit.
-        rows = behind.any(axis=1)
+        # Only what is held, and the joint next to it: other angles stay as they are to the last bit.
+        moved = behind.copy()
+        moved[:, 1:] |= behind[:, :-1]
         turned = np.diff(headings, axis=1, prepend=0.0)
-        moved = rows[:, None] & (behind | np.roll(behind, 1, axis=1))
-        moved[:, 0] = behind[:, 0]
         result[:, 1:] = np.where(moved, turned, configurations[:, 1:])
         return result
 

@@ -1,8 +1,8 @@
 """Trajectories as ROS 2 messages, `trajectory_msgs/msg/JointTrajectory`.
 
-Both texts are read by ``ros2 topic pub /TOPIC trajectory_msgs/msg/JointTrajectory "$(cat FILE)"``. It reads YAML 1.1,
-of which the JSON written here is a part: numbers have a point before an exponent, for without it they would be
-strings there.
+``ros2 topic pub /TOPIC trajectory_msgs/msg/JointTrajectory "$(cat FILE)"`` reads both texts. It reads
+YAML 1.1, of which the JSON written here is a part: numbers have a point before an exponent, for without it
+they would be strings there.
 """
 
 from __future__ import annotations

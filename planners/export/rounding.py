@@ -3,9 +3,9 @@
 Between poses feed and joint angles change linearly, so at every pose all speeds jump, and no arm could follow
 without stopping there. The path here is a cubic B-spline whose control points lie on the motion: every point
 of it is an average of configurations that the motion passes nearby, with weights that sum to one. It turns no
-joint farther than the motion does, keeps what is straight straight, and moves off by about an eighth of the
-spacing of its control points times the jump of the rates. Where a joint would end up farther off than allowed,
-the spacing is halved.
+joint farther than the motion does, keeps what is straight straight, and moves off by about a sixth of the
+spacing of its control points times the jump of the rates. Where a joint would end up farther off than
+allowed, the spacing is halved.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ SPACING = 0.1
 """Of the control points where nothing is near a corner, in link lengths of feed."""
 
 TURN_PER_LENGTH = 16.0
-"""Where joints turn while the feed hardly moves, so many rad count as a link length: no joint turns faster when
-the feeder lets go of it (`hrsnake_env.arm.feeder_angle_limits`), so places are feeds where the feed only grows."""
+"""Where joints turn while the feed hardly moves, so many rad count as a link length. No joint turns faster
+than that when the feeder lets go of it (`hrsnake_env.arm.feeder_angle_limits`)."""
 
 ROUNDS = 14
 """How often the spacing is halved at most."""

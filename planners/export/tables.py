@@ -48,10 +48,9 @@ def json_bytes(trajectory: Trajectory) -> bytes:
 def npz_bytes(trajectory: Trajectory) -> bytes:
     """Return a trajectory as .npz, with the arrays of `Trajectory` under their names."""
     file = io.BytesIO()
-    arrays: dict[str, Any] = {name: getattr(trajectory, name) for name in ARRAYS}
-    np.savez_compressed(
-        file, **{key: np.asarray(value) for key, value in _facts(trajectory).items()}, **arrays
-    )
+    arrays: dict[str, Any] = {key: np.asarray(value) for key, value in _facts(trajectory).items()}
+    arrays |= {name: getattr(trajectory, name) for name in ARRAYS}
+    np.savez_compressed(file, **arrays)
     return file.getvalue()
 
 

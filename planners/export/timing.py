@@ -2,8 +2,8 @@
 
 1. The poses become a path without corners, a cubic B-spline near them (`planners.export.rounding`).
 2. TOPP-RA finds the fastest way along it within the limits of speed and acceleration, from rest to rest.
-3. What comes of that is sampled at the controller's rate, and the samples become the control points of a cubic
-   B-spline in time. Its speeds and accelerations are averages of those before, so they keep to the limits
+3. What comes of that is sampled at the controller's rate, and the samples become the control points of a
+   cubic B-spline in time. Its speeds and accelerations are averages of those before, so they keep to the limits
    between the samples, too; they change without a jump; and the cubics through its positions and velocities,
    which controllers drive, are that spline itself.
 """
@@ -171,7 +171,7 @@ def _apart(places: FloatArray) -> FloatArray:
     keep = np.concatenate([[True], np.diff(places) > GRID_STEP])
     kept = places[keep]
     kept[-1] = places[-1]
-    return kept
+    return np.asarray(kept)
 
 
 def _feed_speeds(feed: FloatArray, release: FloatArray, fastest: float, rate: float) -> FloatArray:
@@ -240,16 +240,6 @@ def _fastest(
     return np.stack([times, along], axis=1)
 
 
-def _apart(places: FloatArray) -> FloatArray:
-    """Leave out of sorted places those that are next to the one before."""
-    keep = np.concatenate([[True], np.diff(places) > GRID_STEP])
-    keep[-1] = True
-    kept = places[keep]
-    if len(kept) > 2 and kept[-1] - kept[-2] <= GRID_STEP:
-        kept = np.delete(kept, -2)
-    return kept
-
-
 def _place_at(clock: FloatArray, places: FloatArray, times: FloatArray) -> FloatArray:
     """Return the places along the path at times: between grid points the speed changes evenly."""
     before = np.clip(np.searchsorted(clock[:, 0], times, side="right") - 1, 0, len(places) - 2)
@@ -257,7 +247,7 @@ def _place_at(clock: FloatArray, places: FloatArray, times: FloatArray) -> Float
     since = np.clip(times - clock[before, 0], 0.0, span)
     gain = (clock[before + 1, 1] - clock[before, 1]) / span
     reached = places[before] + since * (clock[before, 1] + 0.5 * gain * since)
-    return np.minimum(reached, places[before + 1])
+    return np.asarray(np.minimum(reached, places[before + 1]))
 
 
 def _sampled(
@@ -282,7 +272,8 @@ def _sampled(
         n = max(1, int(np.ceil(clock[-1, 0] * stretch * rate)))
         if n > LONGEST:
             raise InputError(
-                f"Expected a trajectory of at most {LONGEST} samples, got {n}: lower the rate or raise the limits."
+                f"Expected a trajectory of at most {LONGEST} samples, got {n}: "
+                "lower the rate or raise the limits."
             )
         reached = _place_at(clock, places, np.linspace(0.0, clock[-1, 0], n + 1))
         reached[[0, -1]] = places[[0, -1]]
@@ -305,8 +296,11 @@ def _trajectory(
 ) -> Trajectory:
     """Read positions, velocities and accelerations off the spline with these control points."""
     before, here, after = control[:-2], control[1:-1], control[2:]
-    tables = ((before + 4.0 * here + after) / 6.0, 0.5 * rate * (after - before))
-    tables = (*tables, rate**2 * ((after - here) - (here - before)))
+    tables = [
+        (before + 4.0 * here + after) / 6.0,
+        0.5 * rate * (after - before),
+        rate**2 * ((after - here) - (here - before)),
+    ]
     shape = (len(here), *motion.joint_angles.shape[1:])
     feeds = [motion.link_length * table[:, 0] for table in tables]
     angles = [table[:, 1:].reshape(shape) for table in tables]

@@ -88,7 +88,9 @@ class TrajectoryLimits:
         )
 
     def arrays(self, link_length: float, n_angles: int) -> tuple[FloatArray, FloatArray]:
-        """Return speeds and accelerations, shape (1 + n_angles,): of the feed in link lengths, then of joints.
+        """Return speeds and accelerations, shape (1 + n_angles,): first of the feed.
+
+        Those of the feed are in link lengths.
 
         Raises
         ------

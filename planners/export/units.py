@@ -38,6 +38,6 @@ def metres_in(units: str, given: float | None = None) -> float:
     if units in METRES:
         return METRES[units]
     raise InputError(
-        f"Expected the length of one {units or 'unit'} in metres (--metres-per-unit 0.001), as robots count in "
-        f"metres; known without it: {', '.join(METRES)}."
+        f"Expected the length of one {units or 'unit'} in metres (--metres-per-unit 0.001), as robots count "
+        f"in metres; known without it: {', '.join(METRES)}."
     )

@@ -1,7 +1,7 @@
 """The arm as URDF: a prismatic feeder, and links that turn; the names of its joints are the trajectory's.
 
-The root link is the maze: its origin and axes are those of the maze, in metres. At zero positions the whole arm
-is straight in the feeder, with its tip at the base.
+The root link is the maze: its origin and axes are those of the maze, in metres. At zero positions the whole
+arm is straight in the feeder, with its tip at the base.
 """
 
 from __future__ import annotations
@@ -10,8 +10,6 @@ import math
 import re
 import xml.etree.ElementTree as Xml
 from collections.abc import Sequence
-
-import numpy as np
 
 from hrsnake_env.arm import ArmSpec, FloatArray
 from planners.export.trajectory import TrajectoryLimits
@@ -99,7 +97,7 @@ def _base(motion: Motion | SpatialMotion, metres_per_unit: float) -> tuple[Seque
     yaw = math.atan2(axes[1, 0], axes[0, 0])
     if math.hypot(axes[0, 0], axes[1, 0]) < 1e-9:  # vertical: yaw and roll turn about one axis
         roll, yaw = 0.0, math.atan2(-axes[0, 1], axes[1, 1])
-    return metres_per_unit * np.asarray(motion.base_pose[:3]), (roll, pitch, yaw)
+    return [metres_per_unit * float(value) for value in motion.base_pose[:3]], (roll, pitch, yaw)
 
 
 def _text(values: Sequence[float] | FloatArray) -> str:
@@ -130,7 +128,7 @@ def _joint(
 
 
 def _solid(robot: Xml.Element, name: str, length: float, radius: float, close: float | None) -> None:
-    """Add a link along x: a cylinder with mass, shown with round ends, and a capsule of radius `close` to hit."""
+    """Add a link along x: a cylinder with mass, shown as a capsule; one of radius `close` is to be hit."""
     link = Xml.SubElement(robot, "link", name=name)
     mass = DENSITY * math.pi * radius**2 * length
     inertial = Xml.SubElement(link, "inertial")
