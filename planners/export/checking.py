@@ -1,10 +1,10 @@
 """Check trajectories as motions are checked: independently, and as a controller drives them.
 
 Between samples a controller goes along cubics through positions and velocities. So many poses are taken
-from these that what changes linearly between them is no farther off than `CHORD`; the exact checker
-(`planners.validation`) then decides on these poses and on everything between them. A motion may get as deep as
-the pinch tolerance between its poses and not at them; of a trajectory no moment is more of a pose than any
-other, so it may get that deep at any. All other rules are the motion's.
+from these that what changes linearly between them is no farther off than `CHORD`. The exact checker
+(`planners.validation`) then decides on these poses and on everything between them. A motion may get as deep
+as the pinch tolerance between its poses and not at them; of a trajectory no moment is more of a pose than
+any other, so it may get that deep at any. All other rules are the motion's.
 """
 
 from __future__ import annotations

@@ -3,9 +3,9 @@
 1. The poses become a path without corners, a cubic B-spline near them (`planners.export.rounding`).
 2. TOPP-RA finds the fastest way along it within the limits of speed and acceleration, from rest to rest.
 3. What comes of that is sampled at the controller's rate, and the samples become the control points of a
-   cubic B-spline in time. Its speeds and accelerations are averages of those before, so they keep to the limits
-   between the samples, too; they change without a jump; and the cubics through its positions and velocities,
-   which controllers drive, are that spline itself.
+   cubic B-spline in time. Its speeds and accelerations are averages of those before, so they keep to the
+   limits between the samples, too; they change without a jump; and the cubics through its positions and
+   velocities, which controllers drive, are that spline itself.
 """
 
 from __future__ import annotations
