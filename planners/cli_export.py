@@ -161,7 +161,7 @@ def _show(made: Export, maze: Maze | Workspace, data: dict[str, Any]) -> None:
             ),
             (
                 "off the motion",
-                f"at most {data['deviation']:.3g} {maze.units}, {data['deviation'] / length:.2g} link lengths",
+                f"{data['deviation']:.3g} {maze.units} at most, {data['deviation'] / length:.2g} link lengths",
             ),
         ]
     depth = made.report.penetration_between

@@ -169,6 +169,28 @@ def test_what_is_exported_is_valid_at_twice_as_many_moments(trajectory: Trajecto
     assert check_trajectory(finer, MAZE, limits=LIMITS).valid
 
 
+@pytest.mark.parametrize("planner", ["beam", "sweep"])
+def test_motions_that_bend_joints_at_the_base_or_draw_back_are_followed_too(planner: str) -> None:
+    """The paper's planner turns joints at the base as fast as may be; the sweep draws the arm back at times."""
+    maze, arm = Maze.load("fig19"), ArmSpec(link_length=LINK)
+    motion = plan(maze, arm, planner=planner).motion
+    assert motion is not None
+    trajectory, report = safe_trajectory(motion, maze, arm)
+    assert report.valid
+    assert max(largest_shares(trajectory, TrajectoryLimits()).values()) <= 1.001
+    assert (np.diff(trajectory.feed) < 0.0).any() == (np.diff(motion.feed) < 0.0).any()
+
+
+def test_samples_too_far_apart_are_refused_in_a_sentence_that_says_what_helps() -> None:
+    maze, arm = Maze.load("fig19"), ArmSpec(link_length=LINK)
+    motion = plan(maze, arm, planner="beam").motion
+    assert motion is not None
+    with pytest.raises(
+        ExportRefused, match=r"^No trajectory at 0\.3 samples per second .* Try a larger --rate"
+    ):
+        safe_trajectory(motion, maze, arm, rate=0.3)
+
+
 def test_a_forged_collision_is_refused_with_its_time(trajectory: Trajectory) -> None:
     angles = trajectory.joint_angles.copy()
     middle = int(0.9 * trajectory.n_points)
@@ -335,7 +357,7 @@ def test_the_urdf_in_space_puts_the_joints_where_the_motion_has_them(motion_in_s
 
 
 def test_what_does_not_fit_together_is_refused_in_a_sentence(motion_in_space: SpatialMotion) -> None:
-    with pytest.raises(InputError, match="Expected one of csv, .* for a motion in space, got 'gif'"):
+    with pytest.raises(InputError, match=r"Expected one of csv, .* for a motion in space, got 'gif'"):
         export(motion_in_space, MAZE, format="gif")
     with pytest.raises(InputError, match="Expected a motion in the plane with a maze"):
         export(motion_in_space, MAZE)

@@ -45,6 +45,10 @@ LIMIT_TOLERANCE = 1e-3
 CHORD = 0.02 * PINCH_TOLERANCE
 """How far poses between those that are checked may be from where the checker has them, in link lengths."""
 
+HOPELESS = 8.0
+"""How many times farther off than the rounded path a trajectory is whose samples are too far apart: a closer
+path is no help then."""
+
 STEP_SHARE = 0.8
 """Of the largest step between two poses: what is taken from the cubics stays below."""
 
@@ -305,6 +309,8 @@ def safe_trajectory(
         report = check_trajectory(trajectory, maze, arm, limits, progress)
         if report.valid:
             return trajectory, report
+        if trajectory.deviation > HOPELESS * deviation * motion.link_length:
+            break
     raise ExportRefused(
         f"No trajectory at {rate:g} samples per second keeps to this motion: {report.faults[0].message} "
         f"Try a larger --rate, or lower speeds and accelerations.",
