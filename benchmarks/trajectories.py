@@ -52,7 +52,8 @@ def row(motion: Motion, maze: Maze, limits: TrajectoryLimits, rate: float) -> st
     return (
         f"| {maze.name} | {length:g} | {rate:g} | {trajectory.duration:.2f} | "
         f"{fastest_duration(motion, limits):.2f} | {trajectory.n_points} | "
-        f"{trajectory.deviation / length:.2g} | {report.penetration_between / length:.2g} | {seconds:.2f} | {checking(trajectory, maze):.2f} |"
+        f"{trajectory.deviation / length:.2g} | {report.penetration_between / length:.2g} | "
+        f"{seconds:.2f} | {checking(trajectory, maze):.2f} |"
     )
 
 

@@ -148,7 +148,8 @@ def _facts(
 def _show(made: Export, maze: Maze | Workspace, data: dict[str, Any]) -> None:
     rows = []
     if made.trajectory is not None:
-        shares, length = data["shares_of_limits"], made.trajectory.link_length
+        shares = data["shares_of_limits"]
+        off, off_in_links = data["deviation"], data["deviation"] / made.trajectory.link_length
         rows = [
             (
                 "duration",
@@ -161,7 +162,7 @@ def _show(made: Export, maze: Maze | Workspace, data: dict[str, Any]) -> None:
             ),
             (
                 "off the motion",
-                f"{data['deviation']:.3g} {maze.units} at most, {data['deviation'] / length:.2g} link lengths",
+                f"at most {off:.3g} {maze.units}, {off_in_links:.2g} link lengths",
             ),
         ]
     depth = made.report.penetration_between
