@@ -131,9 +131,9 @@ def _looking(heading: float | None) -> str:
     )
 
 
-def _guarded(free: Area, guards: list[np.ndarray]) -> Area:
+def _guarded(free: Area, guards: list[shapely.Geometry]) -> Area:
     """Return the free space without what chords leave out of curves."""
-    every = np.concatenate([*guards, np.empty(0, dtype=object)])
+    every = np.array(guards, dtype=object)
     if free.is_empty or not len(every):
         return free
     shapely.prepare(free)
