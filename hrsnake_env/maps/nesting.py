@@ -143,7 +143,7 @@ def nested(rings: Sequence[FloatArray], is_wall: Sequence[bool], gap: float, thi
             for j in obstacles[tree.query(areas[i], predicate="intersects")].tolist()
             if (i, j) not in around
         ]
-        rooms.append(shapely.difference(even_odd([rings[i]]), shapely.union_all(areas[near])))
+        rooms.append(shapely.difference(even_odd([rings[i]]), shapely.disjoint_subset_union_all(areas[near])))
     return Nesting(free_space=_apart(rooms, thickness), free=free, twice=twice, crossing=crossing)
 
 

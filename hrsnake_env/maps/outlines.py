@@ -137,7 +137,8 @@ def _guarded(free: Area, guards: list[shapely.Geometry]) -> Area:
     if free.is_empty or not len(every):
         return free
     shapely.prepare(free)
-    return shapely.difference(free, shapely.union_all(every[shapely.intersects(free, every)]))
+    near = every[shapely.intersects(free, every)]
+    return shapely.difference(free, shapely.disjoint_subset_union_all(near))
 
 
 def _without_slivers(free: Area, size: float) -> Area:

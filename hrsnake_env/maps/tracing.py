@@ -73,7 +73,7 @@ class Traced:
     def take(self, trace: Trace) -> None:
         """Take over what is known of a trace's curves."""
         if len(trace.guards):  # one union per curve is far faster than one of all
-            self.guards.append(shapely.union_all(trace.guards))
+            self.guards.append(shapely.disjoint_subset_union_all(trace.guards))
         self.deviation = max(self.deviation, trace.deviation)
 
 
