@@ -277,6 +277,11 @@ def test_areas_named_free_are_joined() -> None:
     assert same_area(reading.free_space, box(0, 0, 6, 2).union(box(4, 0, 6, 9)))
 
 
+def test_a_scribble_is_refused() -> None:
+    with pytest.raises(InputError, match="scribble"):
+        rings(Polygon(np.random.default_rng(1).uniform(0, 1, (2000, 2))))
+
+
 def test_a_bow_tie_is_free_in_both_halves_and_solid_in_all_of_it() -> None:
     star = [(5 + 3 * math.cos(0.8 * math.pi * k), 5 + 3 * math.sin(0.8 * math.pi * k)) for k in range(5)]
     room = rings(Polygon(star))

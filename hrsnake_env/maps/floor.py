@@ -71,7 +71,7 @@ def _named(things: list[list[Ring]], thick: list[Area], table: dict[str, str], n
         notes.append(f"{counted(n_around, 'outline')} around the free space left out.")
     if n_unnamed:
         notes.append(f"{counted(n_unnamed, 'closed outline')} without a role taken as obstacles.")
-    return shapely.difference(space, shapely.union_all(walls))
+    return shapely.difference(space, shapely.disjoint_subset_union_all(walls))
 
 
 def _floor_plan(

@@ -12,8 +12,35 @@ from shapely import STRtree
 from shapely.geometry import MultiPolygon, Polygon
 
 from hrsnake_env.arm import FloatArray
+from hrsnake_env.errors import InputError
 
-__all__ = ["Nesting", "even_odd", "filled", "nested", "odd", "polygons"]
+__all__ = ["MAX_CROSSINGS", "Nesting", "check_crossings", "even_odd", "filled", "nested", "odd", "polygons"]
+
+
+MAX_CROSSINGS = 20_000
+"""Of one outline with itself: more of them are a scribble, and take minutes."""
+
+N_PROBES = 500
+
+
+def check_crossings(points: FloatArray) -> None:
+    """Check that a line does not cross itself too often, as far as some of its sides tell.
+
+    Raises
+    ------
+    InputError
+        If it does.
+    """
+    n = len(points) - 1
+    if n * n < 2 * MAX_CROSSINGS:
+        return
+    sides = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1))
+    probes = sides[:: max(1, n // N_PROBES)]
+    hits = len(STRtree(sides).query(probes, predicate="crosses")[0])
+    if hits * n / len(probes) > 2 * MAX_CROSSINGS:
+        raise InputError(
+            f"Expected outlines that cross themselves at most {MAX_CROSSINGS:,} times, got a scribble."
+        )
 
 
 def polygons(geometry: shapely.Geometry) -> list[Polygon]:
@@ -116,7 +143,7 @@ def nested(rings: Sequence[FloatArray], is_wall: Sequence[bool], gap: float, thi
             for j in obstacles[tree.query(areas[i], predicate="intersects")].tolist()
             if (i, j) not in around
         ]
-        rooms.append(shapely.difference(even_odd([rings[i]]), shapely.union_all(areas[near])))
+        rooms.append(shapely.difference(even_odd([rings[i]]), shapely.disjoint_subset_union_all(areas[near])))
     return Nesting(free_space=_apart(rooms, thickness), free=free, twice=twice, crossing=crossing)
 
 

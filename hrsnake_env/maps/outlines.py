@@ -131,13 +131,14 @@ def _looking(heading: float | None) -> str:
     )
 
 
-def _guarded(free: Area, guards: list[np.ndarray]) -> Area:
+def _guarded(free: Area, guards: list[shapely.Geometry]) -> Area:
     """Return the free space without what chords leave out of curves."""
-    every = np.concatenate([*guards, np.empty(0, dtype=object)])
+    every = np.array(guards, dtype=object)
     if free.is_empty or not len(every):
         return free
     shapely.prepare(free)
-    return shapely.difference(free, shapely.union_all(every[shapely.intersects(free, every)]))
+    near = every[shapely.intersects(free, every)]
+    return shapely.difference(free, shapely.disjoint_subset_union_all(near))
 
 
 def _without_slivers(free: Area, size: float) -> Area:
