@@ -25,7 +25,7 @@ import numpy as np
 from hrsnake_env.mazes import PAPER_LINK_LENGTHS
 
 STARTS, PLANS, CLIENTS, CROWD = 5, 15, 20, 60
-COMMAND = "import typer; from planners.cli_studio import studio_command; typer.run(studio_command)"
+COMMAND = ["-c", "from planners.cli import main; main()", "studio", "--no-browser", "--port", "0"]
 LENGTHS = np.linspace(380.0, 436.0, CLIENTS)
 """One for each client, by which its answer is known."""
 
@@ -34,7 +34,7 @@ LENGTHS = np.linspace(380.0, 436.0, CLIENTS)
 def studio(*options: str) -> Iterator[tuple[subprocess.Popen[str], int, float]]:
     """Start the studio; yield its process, its port and the moment of its start."""
     start = time.perf_counter()
-    words = [sys.executable, "-c", COMMAND, "--no-browser", "--port", "0", *options]
+    words = [sys.executable, *COMMAND, *options]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None
@@ -112,6 +112,33 @@ def crowd(port: int, scene: Any, n_clients: int) -> dict[str, Any]:
     return {**counts, "seconds": time.perf_counter() - start}
 
 
+def maps_at_once(port: int) -> dict[str, Any]:
+    """Let as many clients send large images of a map at once; count their answers."""
+    image = np.full((2000, 2000), 255, dtype=np.uint8)
+    image[::1999], image[:, ::1999], image[900:1100, 300:1700] = 0, 0, 0
+    data = base64.b64encode(b"P5\n2000 2000\n255\n" + image.tobytes()).decode()
+    body = json.dumps({"files": [{"name": "map.pgm", "data": data}]})
+    kinds: list[str] = []
+
+    def ask() -> None:
+        with contextlib.closing(http.client.HTTPConnection("127.0.0.1", port)) as connection:
+            connection.request("POST", "/api/map", body, {"Content-Type": "application/json"})
+            last = json.loads([line for line in connection.getresponse() if line.strip()][-1])
+        kinds.append(last["type"] if last["type"] == "done" else last["kind"])
+
+    threads = [threading.Thread(target=ask) for _ in range(CLIENTS)]
+    start = time.perf_counter()
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return {
+        "read": kinds.count("done"),
+        "refused": kinds.count("busy"),
+        "seconds": time.perf_counter() - start,
+    }
+
+
 def first_pages() -> list[float]:
     """Return the seconds from the start of the process to the page."""
     seconds = []
@@ -150,6 +177,11 @@ def main() -> None:
                 f"| {n_clients} clients at once | {found['right']} right, {found['refused']} refused, "
                 f"{found['wrong']} wrong, in {found['seconds']:.2f} s |"
             )
+        maps = maps_at_once(port)
+        print(
+            f"| {CLIENTS} images of 2,000 x 2,000 at once | {maps['read']} read, {maps['refused']} refused, "
+            f"in {maps['seconds']:.2f} s |"
+        )
         used = memory(process.pid)
         print(f"| largest memory | server {used['server']:.0f} MiB, workers {used['workers']:.0f} MiB |")
 

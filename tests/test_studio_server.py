@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hrsnake_env.arm import ArmSpec
@@ -250,6 +250,7 @@ values = st.recursive(
 )
 
 
+@settings(max_examples=50, deadline=None)
 @given(
     path=st.sampled_from([("scene",), ("arm",), ("scene", "shapes"), ("scene", "base"), ("scene", "goal")]),
     value=values,
@@ -656,7 +657,7 @@ def test_a_trajectory_keeps_the_limits_that_were_given(studio: Studio, run: dict
     [
         ({"format": "docx"}, "Unknown format 'docx'"),
         ({"format": "urdf"}, "metre"),
-        ({"limits": {"wit": 3.0}}, "Unknown limit 'wit'"),
+        ({"limits": {"wish": 3.0}}, "Unknown limit 'wish'"),
         ({"runs": 2}, "Expected one run"),
         ({"motion": None}, "plan first"),
         ({"motion": "forged"}, "Expected a valid motion"),
@@ -720,6 +721,7 @@ def test_a_file_that_is_no_motion_is_refused_before_it_is_unpacked(data: bytes, 
         motion_from(base64.b64encode(data).decode())
 
 
+@settings(max_examples=30, deadline=None)
 @given(st.binary(max_size=200))
 def test_a_torn_motion_is_refused_or_the_same(noise: bytes) -> None:
     motion = Motion.from_configurations([0.0, 1.0], [[0.0], [0.1]], 2.0, (0.0, 0.0, 0.0))

@@ -216,7 +216,9 @@ def _last_line(desk: Desk, kind: str, body: bytes, tasks: dict[str, Any]) -> byt
     except InputError as error:
         return error_line("input", str(error))
     except MemoryError:
-        return error_line("limit", "The job needed more memory than one job may use.")
+        return error_line(
+            "limit", "The job needs more memory than one may use: try longer links, or a smaller drawing."
+        )
     except KeyboardInterrupt:
         return error_line("time", "The search was stopped before any length was tried.")
     except Exception as error:
