@@ -34,7 +34,7 @@ const runs = new Runs({ store, watch: (chosen) => watchRuns(chosen), changed: ()
 const watch = new Watch({ runs, fail });
 const exporter = new Exporter({ runs, scene: () => store.scene, arm: () => panel.arm(), fail, say });
 const maps = new MapDialog();
-const about = { planners: [], mazes: [], exports: [], map_endings: [], limits: {} };
+const about = { planners: [], mazes: [], exports: [], map_endings: [], limits: {}, start: null };
 
 let later = 0;
 function remember() {
@@ -118,7 +118,8 @@ async function plan() {
     return done;
   });
   const solved = (found ?? []).filter(Boolean);
-  if (found && found.length === names.length && solved.length) watchRuns(solved);
+  if (found && solved.length === names.length) watchRuns(solved);
+  else if (found) byId("outcomes").scrollIntoView({ block: "nearest" });
 }
 /** Show an answer; returns its run if there is a motion. */
 function answered({ planner, result, scene, arm, seconds }) {
@@ -145,6 +146,7 @@ async function longest() {
     ? runs.add({ title: titleOf(scene, result, panel.planner), planner: result.planner, arm: { ...arm, link_length: result.length }, scene, result }) : null;
   const use = (length) => { panel.set({ link_length: shortened(length), n_links: "" }); byId("link-length").focus(); };
   byId("outcomes").replaceChildren(longestCard({ result, scene, use, watch: run && (() => watchRuns([run])) }));
+  byId("outcomes").scrollIntoView({ block: "nearest" });
 }
 /** Six digits, rounded down: a rounded-up length may not pass. */
 function shortened(length) {
@@ -276,8 +278,7 @@ async function start() {
     fail(error instanceof ApiError ? error.message : String(error));
   }
   if (old) panel.set(old.settings);
-  const wanted = new URLSearchParams(location.search).get("maze");
-  if (wanted) await openMaze(wanted);
+  if (about.start) await openMaze(about.start); // the one that the command line was given
   root.dataset.ready = "1";
 }
 function step(way) {

@@ -128,7 +128,8 @@ export class Editor {
       const part = only === "base" ? { base: [...at, scene.base ? scene.base[2] : 90] } : { goal: at };
       this.store.change(part);
       this.say(`The ${only} is at ${numberText(at[0])}, ${numberText(at[1])}.`);
-      if (!pickedByKey) this.grab = grabAt(this.store.scene, at, { scale: this.view.scale, selected: -1, only, reach: 1 });
+      if (pickedByKey) return;
+      this.grab = grabAt(this.store.scene, at, { scale: this.view.scale, selected: -1, only, reach: 1 });
     }
     if (!this.grab) {
       this.selectShape(-1);

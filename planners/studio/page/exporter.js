@@ -5,7 +5,7 @@ import { fileName } from "./files.js";
 
 const byId = (id) => document.getElementById(id);
 const PLAIN = new Set(["geojson"]); // of the maze alone
-const UNTIMED = new Set(["geojson", "html"]);
+const UNTIMED = new Set(["geojson", "html", "motion"]);
 
 export class Exporter {
   constructor({ runs, scene, arm, fail, say }) {

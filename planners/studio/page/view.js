@@ -79,7 +79,7 @@ export class View {
     const over = (value, size) => Math.min(value - margin, 0) + Math.max(value - size + margin, 0);
     this.panBy(-over(sx, this.width), -over(sy, this.height));
   }
-  get gridStep() { return roundStep(14 / this.scale); }
+  get gridStep() { return roundStep(10 / this.scale); }
 
   redraw() {
     if (this.awaited) return;

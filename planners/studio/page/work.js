@@ -32,6 +32,7 @@ export class Work {
     Object.assign(byId("stop"), { hidden: !stoppable, disabled: false });
     byId("work").hidden = byId("work-time").hidden = false;
     byId("work-time").textContent = "";
+    byId("work").scrollIntoView({ block: "nearest" });
     try {
       return await act((path, body, name) => this.ask(path, body, name ?? title));
     } catch (error) {
@@ -55,7 +56,7 @@ export class Work {
   }
   hear(line) {
     if (line.type === "job") this.id = line.id;
-    if (line.type === "queued") byId("work-stage").textContent = line.ahead > 0 ? `waiting, ${line.ahead} ahead` : "starting";
+    if (line.type === "queued") byId("work-stage").textContent = line.ahead > 0 ? `waiting, ${line.ahead} ahead` : line.warming ? "warming up" : "starting";
     if (line.type !== "progress") return;
     if (line.stage) byId("work-stage").textContent = line.stage;
     if (typeof line.share === "number") byId("work-bar").value = Math.min(Math.max(line.share, 0), 1);
