@@ -28,6 +28,7 @@ from planners.export import (
     Trajectory,
     TrajectoryLimits,
     check_trajectory,
+    checking,
     export,
     export_bytes,
     fastest_duration,
@@ -187,10 +188,13 @@ def test_a_motion_that_draws_the_arm_back_is_followed_too(motion: Motion) -> Non
     assert trajectory.feed_velocity.min() < -0.5 * LINK * 0.9
 
 
-def test_samples_too_far_apart_are_refused_in_a_sentence_that_says_what_helps(motion: Motion) -> None:
-    hasty = TrajectoryLimits(joint_speed=50.0, joint_acceleration=5e3, feed_speed=3e4, feed_acceleration=3e6)
-    with pytest.raises(ExportRefused, match=r"^No trajectory at 0\.1 samples .* Try a larger --rate"):
-        safe_trajectory(motion, MAZE, limits=hasty, rate=0.1)
+def test_a_refusal_says_where_and_what_helps(motion: Motion, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(checking, "DEVIATIONS", (300.0,))  # a path that cuts the corner
+    sentence = r"^No trajectory at 50 samples .* Link \d+ .* s\. Try a larger --rate"
+    with pytest.raises(ExportRefused, match=sentence) as refusal:
+        safe_trajectory(motion, MAZE)
+    assert refusal.value.report is not None
+    assert not refusal.value.report.valid
 
 
 def test_a_forged_collision_is_refused_with_its_time(trajectory: Trajectory) -> None:
