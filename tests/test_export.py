@@ -189,7 +189,8 @@ def test_a_motion_that_draws_the_arm_back_is_followed_too(motion: Motion) -> Non
 
 
 def test_a_refusal_says_where_and_what_helps(motion: Motion, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(checking, "DEVIATIONS", (300.0,))  # a path that cuts the corner
+    monkeypatch.setattr(checking, "DEVIATIONS", (900.0,))  # paths that cut the corner
+    monkeypatch.setattr(rounding, "SPACING", 2.0)
     sentence = r"^No trajectory at 50 samples .* Link \d+ .* s\. Try a larger --rate"
     with pytest.raises(ExportRefused, match=sentence) as refusal:
         safe_trajectory(motion, MAZE)
