@@ -34,6 +34,7 @@ from planners.export import (
     fastest_duration,
     format_for,
     largest_shares,
+    rounding,
     safe_trajectory,
     save_export,
     time_parametrise,
