@@ -28,11 +28,13 @@ from planners.export import (
     Trajectory,
     TrajectoryLimits,
     check_trajectory,
+    checking,
     export,
     export_bytes,
     fastest_duration,
     format_for,
     largest_shares,
+    rounding,
     safe_trajectory,
     save_export,
     time_parametrise,
@@ -151,6 +153,17 @@ def test_joints_in_the_feeder_are_straight(trajectory: Trajectory) -> None:
     assert np.abs(driven[:, 1:][past < 0.0]).max() <= 1e-15
 
 
+def test_a_joint_that_is_released_just_before_the_end_is_straight_till_then() -> None:
+    feed = np.linspace(0.0, 1.03, 52)
+    angles = np.zeros((52, 3))
+    angles[:, 2] = 0.02 * np.clip(feed - 1.0, 0.0, None)
+    trajectory = time_parametrise(Motion.from_configurations(100.0 * feed, 0.0 + angles, 100.0, [0, 0, 0]))
+    times = np.linspace(0.0, trajectory.duration, 20 * trajectory.n_points)
+    driven = cubic(trajectory)(times)
+    assert driven[-1, 3] == pytest.approx(angles[-1, 2])
+    assert np.abs(driven[:, 3][driven[:, 0] < 100.0]).max() <= 1e-9
+
+
 def test_what_is_exported_is_valid_at_twice_as_many_moments(trajectory: Trajectory) -> None:
     assert check_trajectory(trajectory, MAZE, limits=LIMITS).valid
     times = np.linspace(0.0, trajectory.duration, 2 * trajectory.n_points - 1)
@@ -187,10 +200,14 @@ def test_a_motion_that_draws_the_arm_back_is_followed_too(motion: Motion) -> Non
     assert trajectory.feed_velocity.min() < -0.5 * LINK * 0.9
 
 
-def test_samples_too_far_apart_are_refused_in_a_sentence_that_says_what_helps(motion: Motion) -> None:
-    hasty = TrajectoryLimits(joint_speed=50.0, joint_acceleration=5e3, feed_speed=3e4, feed_acceleration=3e6)
-    with pytest.raises(ExportRefused, match=r"^No trajectory at 0\.1 samples .* Try a larger --rate"):
-        safe_trajectory(motion, MAZE, limits=hasty, rate=0.1)
+def test_a_refusal_says_where_and_what_helps(motion: Motion, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(checking, "DEVIATIONS", (900.0,))  # paths that cut the corner
+    monkeypatch.setattr(rounding, "SPACING", 2.0)
+    sentence = r"^No trajectory at 50 samples .* Link \d+.* s\. Try a larger --rate"
+    with pytest.raises(ExportRefused, match=sentence) as refusal:
+        safe_trajectory(motion, MAZE)
+    assert refusal.value.report is not None
+    assert not refusal.value.report.valid
 
 
 def test_a_forged_collision_is_refused_with_its_time(trajectory: Trajectory) -> None:
