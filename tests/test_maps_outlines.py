@@ -136,7 +136,7 @@ def along(piece: Arc | Bezier, n: int = 2000) -> np.ndarray:
     return (basis.T @ (piece.control * weights[:, None])) / (basis.T @ weights)[:, None]
 
 
-coordinates = st.floats(-10, 10)
+coordinates = st.integers(-10_000, 10_000).map(lambda thousandths: thousandths / 1000)
 places = st.tuples(coordinates, coordinates)
 beziers = st.lists(places, min_size=3, max_size=6).flatmap(
     lambda points: st.builds(
