@@ -68,7 +68,7 @@ def polygons(geometry: shapely.Geometry) -> list[Polygon]:
     return found
 
 
-def without(area: shapely.Geometry, taken: Sequence[shapely.Geometry]) -> MultiPolygon | Polygon:
+def without(area: shapely.Geometry, taken: Sequence[shapely.Geometry] | np.ndarray) -> MultiPolygon | Polygon:
     """Return an area without others.
 
     Rounding of almost parallel sides makes GEOS return invalid areas now and then; on a grid finer than any
