@@ -28,7 +28,7 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.maps.drawing import Drawing, Outline, factor, scaled, sound
 from hrsnake_env.maps.floor import free_space_of
 from hrsnake_env.maps.marks import base_of, goal_of, widest_heading
-from hrsnake_env.maps.nesting import polygons
+from hrsnake_env.maps.nesting import polygons, without
 from hrsnake_env.maps.reading import MapOptions, MapReading
 from hrsnake_env.maps.roles import roles_of
 from hrsnake_env.maps.simplify import simplified_inward
@@ -138,7 +138,7 @@ def _guarded(free: Area, guards: list[shapely.Geometry]) -> Area:
         return free
     shapely.prepare(free)
     near = every[shapely.intersects(free, every)]
-    return shapely.difference(free, shapely.disjoint_subset_union_all(near))
+    return without(free, near)
 
 
 def _without_slivers(free: Area, size: float) -> Area:
