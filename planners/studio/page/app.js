@@ -53,15 +53,19 @@ store.listen((scene) => {
   remember();
 });
 
+const settingsOf = new WeakMap(); // of scenes that replaced another: they come back together
+
 /** Another drawing: the one before comes back with undo. */
 function replaceScene(scene, settings) {
   editor.reset();
-  store.set(scene);
+  settingsOf.set(store.scene, panel.settings());
+  store.set({ ...scene });
   setView("draw");
   view.fit();
   const wide = sizeOf(scene);
   Object.assign(editor.options, { corridor: rounded(wide / 9), wall: rounded(wide / 45) });
   if (settings) panel.set(settings);
+  settingsOf.set(store.scene, panel.settings());
   byId("outcomes").replaceChildren();
   showTools(editor, store);
 }
@@ -283,7 +287,12 @@ async function start() {
 }
 function step(way) {
   editor.cancel();
-  say(store[way]() ? `${way === "undo" ? "Undone" : "Done again"}.` : `Nothing to ${way}.`);
+  const done = store[way](), settings = settingsOf.get(store.scene);
+  if (done && settings) {
+    panel.set(settings);
+    view.fit();
+  }
+  say(done ? `${way === "undo" ? "Undone" : "Done again"}.` : `Nothing to ${way}.`);
 }
 
 // For tests and the curious.

@@ -126,9 +126,10 @@ export class Editor {
     if (!this.grab && only) { // nothing there yet: it is set here
       const at = this.snapped(place), { scene } = this.store;
       const part = only === "base" ? { base: [...at, scene.base ? scene.base[2] : 90] } : { goal: at };
+      this.store.hold();
       this.store.change(part);
       this.say(`The ${only} is at ${numberText(at[0])}, ${numberText(at[1])}.`);
-      if (pickedByKey) return;
+      if (pickedByKey) { this.store.drop(); return; }
       this.grab = grabAt(this.store.scene, at, { scale: this.view.scale, selected: -1, only, reach: 1 });
     }
     if (!this.grab) {
@@ -138,7 +139,7 @@ export class Editor {
     }
     this.selectShape(this.grab.select, this.grab.corner ?? null);
     this.grab.byKey = pickedByKey;
-    this.store.hold();
+    if (this.store.held === null) this.store.hold();
     if (pickedByKey) this.say(`Picked up ${this.grab.name}: arrows move it, Enter drops it, Escape puts it back.`);
   }
   moveTo(exact, free = false) {
@@ -148,7 +149,7 @@ export class Editor {
       const by = this.snapped([exact[0] - from[0], exact[1] - from[1]]);
       to = [from[0] + by[0], from[1] + by[1]];
     }
-    this.store.scene = grab.apply(this.store.held, to, free);
+    this.store.scene = grab.apply(grab.base ??= this.store.scene, to, free);
     this.store.tell();
   }
   drop() {

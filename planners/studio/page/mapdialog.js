@@ -24,6 +24,9 @@ export class MapDialog {
     this.layers = {};
     this.options.closest("form").reset();
     byId("map-layers").replaceChildren();
+    byId("map-notes").replaceChildren(element("li", { textContent: "Reading\u2026" }));
+    byId("map-problem").hidden = true;
+    byId("map-preview").width = 1; // empty
     byId("map-title").textContent = `Read ${files.map((file) => file.name).join(", ")}`;
     this.dialog.returnValue = "";
     this.dialog.showModal();
@@ -62,6 +65,7 @@ export class MapDialog {
       if (control !== this.control || error.kind === "cancelled") return;
       byId("map-problem").hidden = false;
       byId("map-problem").textContent = error.message;
+      byId("map-notes").replaceChildren();
       byId("map-more").open = true;
     }
     delete this.dialog.dataset.reading;

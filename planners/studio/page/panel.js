@@ -53,7 +53,7 @@ export class Panel {
     return Math.min(budget, this.mostBudget);
   }
   get planner() { return byId("planner").value; }
-  get second() { return byId("second").value; }
+  get second() { return byId("second").value === this.planner ? "" : byId("second").value; }
 
   /** What a file remembers of the settings. */
   settings() {

@@ -145,8 +145,8 @@ export class Runs {
     });
     return element("li", {}, mark,
       element("button", { type: "button", className: "name", title: "Watch", onclick: () => this.watch([run]) },
-        element("span", { textContent: run.title }), old ? element("small", { textContent: "of an earlier drawing" }) : null),
-      element("span", { className: `chip ${tone}`, textContent: word }),
+        element("span", { textContent: run.title }),
+        element("small", {}, element("span", { className: `chip ${tone}`, textContent: word }), old ? " of an earlier drawing" : "")),
       element("button", { type: "button", className: "icon", ariaLabel: `Delete ${run.title}`, title: "Delete", innerHTML: '<svg><use href="#i-trash"/></svg>', onclick: () => this.remove(run) }));
   }
   /** After an edit, only the words change. */

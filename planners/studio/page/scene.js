@@ -27,7 +27,7 @@ export function checkedScene(data) {
   if (radius !== null && !(isNumber(radius) && radius > 0)) refuse("its goal has no positive radius");
   const text = (value, otherwise) => (typeof value === "string" && value.trim() ? value.slice(0, 100) : otherwise);
   const scene = {
-    name: text(data.name, "maze"), units: text(data.units, "px"), shapes,
+    name: text(data.name, "maze"), units: text(data.units, "px").slice(0, 40), shapes,
     base: data.base ? data.base.slice(0, 3) : null, goal: data.goal ? data.goal.slice(0, 2) : null,
     goal_radius: radius,
   };
