@@ -54,9 +54,10 @@ def draw(stem: str, name: str) -> None:
         picture = np.concatenate(np.concatenate(rows, axis=1), axis=1)
     write_png(picture, stem)
     drawings = [Drawing(*run, SMALL if n == 1 else (SMALL[1], SMALL[1])) for run in runs]
+    animation = OUT / f"{stem}.gif"
     for n_frames in (60, 52, 44, 36):
-        write_gif([frame for drawing in drawings for frame in drawing.frames(n_frames // n)], stem)
-        if (OUT / f"{stem}.gif").stat().st_size <= LARGEST:
+        write_gif([frame for drawing in drawings for frame in drawing.frames(n_frames // n)], animation)
+        if animation.stat().st_size <= LARGEST:
             break
     if stem == REPLAYED:
         save_replay([runs[0][1].trace(runs[0][0])], OUT / f"{stem}.html")
@@ -97,13 +98,13 @@ def write_png(frame: Frame, stem: str) -> None:
         image.save(part, optimize=True)
 
 
-def write_gif(frames: list[Frame], stem: str) -> None:
+def write_gif(frames: list[Frame], out: Path, milliseconds: int = MILLISECONDS) -> None:
     """Write an animation, all of whose frames have the same colours."""
     sample = np.concatenate(frames[:: max(len(frames) // 6, 1)] + frames[-1:], axis=1)
     palette = Image.fromarray(sample).quantize(COLOURS, dither=Image.Dither.NONE)
     images = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-    times = [MILLISECONDS] * (len(images) - 1) + [AT_THE_GOAL]
-    with replacing(OUT / f"{stem}.gif") as part:
+    times = [milliseconds] * (len(images) - 1) + [AT_THE_GOAL]
+    with replacing(out) as part:
         images[0].save(
             part, save_all=True, append_images=images[1:], duration=times, loop=0, optimize=False, disposal=1
         )

@@ -1,7 +1,7 @@
-"""The two pictures of `docs/planners.md`, drawn from tracks that the sweep really grows.
+"""The pictures of `docs/planners.md`, drawn from what the planners really do.
 
 Run `.venv/bin/python docs/make_pictures.py` from the repository's root: it writes
-`docs/images/viable_intervals.png` and `docs/images/track_chords_poses.png`.
+`docs/images/viable_intervals.png`, `track_chords_poses.png` and `beams_and_corners.png`.
 """
 
 from __future__ import annotations
@@ -19,9 +19,12 @@ from hrsnake_env.appearance import COLOURS
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
+from hrsnake_env.mazes import PAPER_LINK_LENGTHS
 from planners.corners import critical_corners
+from planners.drawing import draw_geometry
 from planners.figures import draw_rings, draw_walls
 from planners.kernels.rod import free_directions
+from planners.planning import plan
 from planners.survey import survey
 from planners.sweep_planner import FINENESSES, MAX_INNER_BEAM, MIN_CURVATURE, VARIANTS
 from planners.sweep_track import Track, aim_line, grow
@@ -220,6 +223,16 @@ def save(figure: Figure, out: Path) -> None:
     print(f"Written: {out.relative_to(IMAGES.parent.parent)}")
 
 
+def draw_beams_and_corners(out: Path) -> None:
+    """Draw what the paper's planner sees in a workspace like its Fig. 17b, and its motion."""
+    maze = Maze.load("fig17b")
+    motion = plan(maze, ArmSpec(link_length=PAPER_LINK_LENGTHS["fig17b"]), "beam").motion
+    assert motion is not None
+    draw_geometry(maze, motion, out)
+    print(f"Written: {out.relative_to(IMAGES.parent.parent)}")
+
+
 if __name__ == "__main__":
     draw_viable_intervals(IMAGES / "viable_intervals.png")
     draw_track_chords_poses(IMAGES / "track_chords_poses.png")
+    draw_beams_and_corners(IMAGES / "beams_and_corners.png")

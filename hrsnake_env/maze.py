@@ -182,6 +182,11 @@ class Maze:
         if kind in SEEDED_MAZES and seed.isascii() and seed.isdigit():
             return SEEDED_MAZES[kind](int(seed))
         if Path(text).suffix.lower() not in (".geojson", ".json"):
+            if Path(text).is_file():
+                raise InputError(
+                    f"Expected a maze (.geojson), but '{text}' is another file: if it is a map, "
+                    f"`hrsnake import {text} --out maze.geojson` makes a maze of it."
+                )
             names = [*MAZES, *(f"{kind}-SEED" for kind in SEEDED_MAZES), *RUNG_MAZES]
             raise InputError(
                 f"Unknown maze {text!r}. Available: {', '.join(names)}; or give the path of a .geojson file."

@@ -6,9 +6,7 @@ that is not clean. `--json` prints one JSON object instead of tables.
 
 from __future__ import annotations
 
-import dataclasses
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,21 +14,31 @@ import typer
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
-from hrsnake_env.maze import MAZES, Maze
+from hrsnake_env.maze import Maze
 from planners import longest, tables
-from planners.cli_bench import add_studies
+from planners.cli_bench import bench_app
+from planners.cli_export import export_command
+from planners.cli_learn import dataset_command, evaluate_command, train_command
+from planners.cli_maps import import_command
 from planners.cli_spatial import spatial_app
+from planners.cli_studio import studio_command
 from planners.cli_tools import (
     BAD_INPUT,
     INTERRUPTED,
+    MAZE_HELP,
     NOT_CLEAN,
     PICTURES,
     JsonOption,
     LimitOption,
+    MazeArgument,
+    MotionArgument,
+    PlannerOption,
     RadiusOption,
     check_folder,
     check_output,
+    examples,
     lengths_in,
+    mazes_named,
     name_of,
     one_bar,
     print_outcome,
@@ -38,45 +46,31 @@ from planners.cli_tools import (
     radians,
 )
 from planners.length_trials import motion_path
-from planners.planning import PLANNERS, TIME_BUDGET, plan
+from planners.planning import TIME_BUDGET, plan
 from planners.problem import Motion, PlanningResult, Progress
-from planners.rl.settings import CLONING, FIRST_SEED, METHODS
-from planners.rl.shipped import POLICIES, policy_path
 from planners.validation import validate
 
 __all__ = ["app", "main"]
 
-app = typer.Typer(
-    name="hrsnake",
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
-
-bench_app = typer.Typer(help="Measure, and print tables to paste.")
-app.add_typer(bench_app, name="bench")
-add_studies(bench_app)
-app.add_typer(spatial_app, name="spatial")
+app = typer.Typer(name="hrsnake", pretty_exceptions_enable=False)
 
 # Some versions of typer carry their own copy of click: its base of all usage errors is found by name.
 UsageError: type[Exception] = next(
     cls for cls in typer.BadParameter.__mro__ if cls.__name__ == "ClickException"
 )
 
-MazeArgument = Annotated[
-    str, typer.Argument(metavar="MAZE", help=f"A .geojson file, or one of: {', '.join(MAZES)}.")
-]
-MotionArgument = Annotated[Path, typer.Argument(metavar="MOTION", help="A motion (.npz).")]
-PlannerOption = Annotated[str, typer.Option("--planner", help=f"auto, {', '.join(PLANNERS)}.")]
-
 
 @app.callback(invoke_without_command=True)
 def help_command(context: typer.Context) -> None:
-    """Plan and simulate hyper-redundant arms in spaces so tight that the links pinch the walls."""
+    """Plan and simulate hyper-redundant arms in spaces so tight that the links pinch the walls.
+
+    `hrsnake COMMAND --help` says more, with examples. Exit codes: 0 done; 2 bad input; 3 no plan, or a
+    verdict that is not clean.
+    """
     if context.invoked_subcommand is None:
         print(context.get_help())
 
 
-@app.command("plan")
 def plan_command(
     maze: MazeArgument,
     link_length: Annotated[float, typer.Option("--link-length", help="In maze units.")],
@@ -96,7 +90,11 @@ def plan_command(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Plan a motion from the feeder to the goal, and check it exactly."""
+    """Plan a motion from the feeder to the goal, and check it exactly.
+
+    Without a plan (exit code 3) it says where the arm stopped, which wall is in the way, and how long a link
+    would pass there; --picture shows it.
+    """
     check_output(out, (".npz",))
     check_output(picture, PICTURES)
     world, arm = Maze.load(maze), _arm(link_length, links, link_radius, joint_limit)
@@ -121,7 +119,6 @@ def plan_command(
         raise typer.Exit(NOT_CLEAN)
 
 
-@app.command("longest")
 def longest_command(
     maze: MazeArgument,
     planner: PlannerOption = "auto",
@@ -146,7 +143,11 @@ def longest_command(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Find the longest link that reaches the goal, and what arms with shorter links need. Ctrl-C: so far."""
+    """Find the longest link that reaches the goal, and how few links it takes. Ctrl-C: so far.
+
+    The table says what shorter links need, too: their number, the range of their joints, the clearance that
+    is left. --state lets the same command go on where it was stopped.
+    """
     check_output(out)
     check_output(plot, PICTURES)
     check_output(state, (".json",))
@@ -175,7 +176,6 @@ def longest_command(
         raise typer.Exit(NOT_CLEAN)
 
 
-@app.command("validate")
 def validate_command(
     maze: MazeArgument,
     motion: MotionArgument,
@@ -183,7 +183,11 @@ def validate_command(
     joint_limit: LimitOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Check a motion exactly: lengths, feeder, clearance at and between poses, crossings, start and goal."""
+    """Check a motion exactly: lengths, feeder, clearance, crossings, start and goal.
+
+    The check shares no code with the planners, and looks between the poses, too. Exit code 3 if a rule is
+    broken; the table says which, where and by how much.
+    """
     world, moved = Maze.load(maze), Motion.load(motion)
     arm = _arm(moved.link_length, moved.n_links, link_radius, joint_limit)
     with progress_bars(as_json) as progress:
@@ -195,7 +199,6 @@ def validate_command(
         raise typer.Exit(NOT_CLEAN)
 
 
-@app.command("simulate")
 def simulate_command(
     maze: MazeArgument,
     motion: MotionArgument,
@@ -207,7 +210,11 @@ def simulate_command(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Drive the simulated arm along a motion, and say whether its links merely pinched the walls."""
+    """Drive the simulated arm along a motion, and say whether its links merely pinched the walls.
+
+    The walls are real bodies here: a link that runs into one is pushed. A link within a thousandth of its
+    length of a wall pinches it; deeper is a collision, and exit code 3.
+    """
     from hrsnake_env.replay import save_replay
     from planners.rollout import simulate_motion  # needs the simulator, which other commands do not
 
@@ -235,7 +242,6 @@ def simulate_command(
         raise typer.Exit(NOT_CLEAN)
 
 
-@app.command("draw")
 def draw_command(
     maze: MazeArgument,
     motion: Annotated[Path | None, typer.Argument(metavar="[MOTION]", help="A motion (.npz) to add.")] = None,
@@ -243,7 +249,10 @@ def draw_command(
     out: Annotated[Path | None, typer.Option("--out", help="The picture (.png, .svg, .pdf).")] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Draw a maze with its global path, left (green) and right (red) beams and critical corners."""
+    """Draw a maze with its global path, left (green) and right (red) beams and critical corners.
+
+    With a motion, five poses of it, too.
+    """
     from planners.drawing import draw_geometry
 
     world = Maze.load(maze)
@@ -258,7 +267,6 @@ def draw_command(
     )
 
 
-@app.command("demo")
 def demo_command(
     out: Annotated[Path, typer.Option("--out", help="Folder for the results; made if missing.")] = Path(
         "demo"
@@ -276,10 +284,9 @@ def demo_command(
         raise typer.Exit(NOT_CLEAN)
 
 
-@app.command("play")
 def play_command(
     maze: Annotated[
-        str, typer.Argument(metavar="[MAZE]", help=f"A .geojson file, or one of: {', '.join(MAZES)}.")
+        str, typer.Argument(metavar="[MAZE]", help=MAZE_HELP, autocompletion=mazes_named)
     ] = "fig19",
     link_length: Annotated[float | None, typer.Option("--link-length", help="In maze units.")] = None,
     links: Annotated[int | None, typer.Option("--links", help="By default enough to reach the goal.")] = None,
@@ -291,256 +298,90 @@ def play_command(
     play(Maze.load(maze), link_length, links, planner)
 
 
-@app.command("dataset")
-def dataset_command(
-    dataset_id: Annotated[
-        str, typer.Argument(metavar="OUT_ID", help="As Minari has it: name-v0 or namespace/name-v0.")
-    ],
-    env: Annotated[
-        list[str] | None,
-        typer.Option("--env", help="An environment; a data set for each. By default random mazes."),
-    ] = None,
-    episodes: Annotated[int, typer.Option("--episodes", help="For each noise level and maze.")] = 10,
-    noise: Annotated[
-        list[float] | None,
-        typer.Option("--noise", help="Of the actions, in shares of the largest one. By default 0 and 0.3."),
-    ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Of the first episode.")] = 0,
-    maze: Annotated[
-        list[str] | None, typer.Option("--maze", help="Another maze for the environment's arm.")
-    ] = None,
-    only_success: Annotated[
-        bool, typer.Option("--only-success", help="Leave out episodes that miss the goal.")
-    ] = False,
-    path: Annotated[
-        Path | None, typer.Option("--path", help="Folder of data sets; by default Minari's.")
-    ] = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Record demonstrations of the planner as a Minari data set."""
-    from planners.dataset import dataset_ids, record_dataset
+PLANNING = "Plan and check"
+OWN = "One's own ducts and arms"
+LEARNING = "Drive and learn"
+MORE = "Space, and measuring"
 
-    if path is not None:
-        check_folder(path)
-    env_ids = list(dict.fromkeys(env or ["HyperRedundantMaze-RandomTrain-v0"]))
-    with progress_bars(as_json) as progress:
-        recordings = [
-            record_dataset(
-                name,
-                env_id,
-                episodes=episodes,
-                noises=noise or (0.0, 0.3),
-                seed=seed,
-                mazes=maze or (),
-                only_success=only_success,
-                path=path,
-                progress=progress,
-            )
-            for name, env_id in zip(dataset_ids(dataset_id, env_ids), env_ids, strict=True)
-        ]
-
-    def show() -> None:
-        for recording in recordings:
-            tables.show_rows(f"Data set {recording.dataset_id}", recording.rows())
-
-    print_outcome(as_json, {"datasets": [recording.to_dict() for recording in recordings]}, show)
-    if not all(recording.n_episodes for recording in recordings):
-        raise typer.Exit(NOT_CLEAN)
-
-
-@app.command("train")
-def train_command(
-    env_id: Annotated[str, typer.Argument(metavar="ENV_ID", help="As HyperRedundantMaze-Straight-v0.")],
-    method: Annotated[str, typer.Option("--method", help=f"{', '.join((*METHODS, *CLONING))}.")] = "ppo",
-    seed: Annotated[int, typer.Option("--seed", help="The same seed gives the same policy.")] = 0,
-    steps: Annotated[
-        int | None, typer.Option("--steps", help="Of all environments together; by default the settings'.")
-    ] = None,
-    stop_at: Annotated[
-        float, typer.Option("--stop-at", help="Share of the last 100 episodes at which the task is learnt.")
-    ] = 0.98,
-    settings: Annotated[
-        Path | None, typer.Option("--settings", help="Other hyper-parameters, as RL Zoo has them (.yml).")
-    ] = None,
-    out: Annotated[Path | None, typer.Option("--out", help="Folder; by default ENV_ID-METHOD-SEED.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on from the folder's checkpoint.")] = False,
-    as_json: JsonOption = False,
-) -> None:
-    """Train a policy, and write it as plain arrays. Ctrl-C: so far, to go on with --resume."""
-    from planners.rl.settings import load_settings
-    from planners.rl.train import train
-
-    folder = Path(f"{env_id}-{method}-{seed}") if out is None else out
-    chosen = None if settings is None else load_settings(method, env_id, file=settings)
-    check_folder(folder)
-    run = train(
-        method,
-        env_id,
-        seed=seed,
-        steps=steps,
-        folder=folder,
-        resume=resume,
-        stop_at=stop_at,
-        quiet=as_json,
-        settings=chosen,
-    )
-    print_outcome(as_json, run.to_dict(), lambda: tables.show_rows(f"{method}: {env_id}", run.rows()))
-    if run.stopped == "interrupted":
-        raise typer.Exit(INTERRUPTED)
-
-
-@app.command("evaluate")
-def evaluate_command(
-    policy: Annotated[
-        str,
-        typer.Argument(metavar="POLICY", help=f"A trained policy (.npz), or one of: {', '.join(POLICIES)}."),
-    ],
-    env: Annotated[
-        str | None, typer.Option("--env", help="By default the environment that it was trained in.")
-    ] = None,
-    episodes: Annotated[int, typer.Option("--episodes", help="Each with the next seed.")] = 100,
-    seed: Annotated[int, typer.Option("--seed", help="Of the first episode.")] = FIRST_SEED,
-    replay: Annotated[
-        Path | None,
-        typer.Option(
-            "--replay", help="Write a page with the first episode, by mean and by sampled actions (.html)."
-        ),
-    ] = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Measure a trained policy from the base, with mean and with sampled actions."""
-    from planners.rl.evaluate import evaluate_both, replayed, summary
-    from planners.rl.network import NetworkPolicy
-
-    check_output(replay, (".html",))
-    acting = NetworkPolicy.load(policy_path(policy))
-    facts = evaluate_both(acting, env, episodes=episodes, seed=seed)
-    if replay is not None:
-        from hrsnake_env.replay import save_replay
-
-        save_replay(replayed(acting, env, seed=seed), replay)
-    figures = {actions: summary(rows) for actions, rows in facts.items()}
-    name = acting.origin.env_id if env is None else env
-    print_outcome(
-        as_json,
-        {"env_id": name, "summary": figures, "episodes": facts, "replay": name_of(replay)},
-        lambda: tables.show_evaluation(f"{acting.origin.method}: {name}", figures, replay),
-    )
-
-
-@bench_app.command("speed")
-def bench_speed_command(
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Fewer and smaller mazes: under a minute, not ten.")
-    ] = False,
-    parts: Annotated[str, typer.Option("--parts", help="Some of the parts, as stages,links.")] = "",
-    out: Annotated[Path | None, typer.Option("--out", help="Write all figures (.json).")] = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Measure speed and scale: stages, growth, memory, first call, random mazes, and OMPL beside."""
-    from planners.bench import speed
-    from planners.bench.speed_tables import speed_markdown
-
-    sizes = speed.QUICK if quick else speed.FULL
-    chosen = _parts(parts, speed.PARTS, out)
-    _publish(speed.run_speed(sizes, parts=chosen, quiet=as_json), speed_markdown, out, as_json)
-
-
-@bench_app.command("paper")
-def bench_paper_command(
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer lengths and mazes: under a minute.")] = False,
-    parts: Annotated[str, typer.Option("--parts", help="Some of the parts, as poses,index.")] = "",
-    out: Annotated[Path | None, typer.Option("--out", help="Write all figures (.json).")] = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Measure the paper's results: workspaces, time per pose, growth, index, families, and its rules."""
-    from planners.bench import paper
-    from planners.bench.paper_tables import paper_markdown
-
-    sizes = paper.QUICK if quick else paper.FULL
-    chosen = _parts(parts, paper.PARTS, out)
-    _publish(paper.run_paper(sizes, parts=chosen, quiet=as_json), paper_markdown, out, as_json)
-
-
-@bench_app.command("spatial")
-def bench_spatial_command(
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer rooms, lengths and repeats.")] = False,
-    parts: Annotated[str, typer.Option("--parts", help="Some of the parts, as figures,rooms.")] = "",
-    out: Annotated[Path | None, typer.Option("--out", help="Write all figures (.json).")] = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Measure in space: the paper's figures, longest links, random rooms, growth, radius, joint limits."""
-    from planners.bench import spatial
-    from planners.bench.spatial_tables import spatial_markdown
-
-    sizes = spatial.QUICK if quick else spatial.FULL
-    chosen = _parts(parts, spatial.PARTS, out)
-    _publish(spatial.run_spatial(sizes, parts=chosen, quiet=as_json), spatial_markdown, out, as_json)
-
-
-@bench_app.command("env")
-def bench_env_command(
-    quick: Annotated[bool, typer.Option("--quick", help="Shorter windows, fewer mazes and steps.")] = False,
-    parts: Annotated[str, typer.Option("--parts", help="Some of the parts, as peers,where.")] = "",
-    random_steps: Annotated[
-        int | None, typer.Option("--random-steps", min=1, help="Of all random policies together.")
-    ] = None,
-    peers_python: Annotated[
-        Path | None, typer.Option("--peers-python", help="A Python with gym-pusht and MuJoCo.")
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", help="Write all figures (.json), and random runs to go on from (.jsonl)."),
-    ] = None,
-    picture: Annotated[
-        Path | None, typer.Option("--picture", help="Draw where a step's time goes (.png, .svg, .pdf).")
-    ] = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Measure the environment: speed beside peers, a step's pieces, resets, vectors, random policies."""
-    from planners.bench import environment
-    from planners.bench.environment_tables import environment_markdown
-    from planners.bench.records import write_results
-
-    check_output(picture, PICTURES)
-    sizes = environment.QUICK if quick else environment.FULL
-    if random_steps is not None:
-        sizes = dataclasses.replace(sizes, random_steps=random_steps)
-    results = environment.run_environment(
-        sizes,
-        parts=_parts(parts, environment.PARTS, out),
-        peers=peers_python,
-        rows=None if out is None else out.with_suffix(".jsonl"),
-        keep=lambda done: None if out is None else write_results(done, out),
-        quiet=as_json,
-    )
-    if picture is not None and "where" in results:
-        from planners.bench.environment_chart import draw_where
-
-        draw_where(results["where"], picture)
-    _publish(results, environment_markdown, out, as_json)
-    if "stopped" in results:
-        raise typer.Exit(INTERRUPTED)
-
-
-@bench_app.command("report")
-def bench_report_command(
-    folders: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Of studies, with their rows.")],
-    out: Annotated[Path, typer.Option("--out", help="Folder for the report; made if missing.")],
-    as_json: JsonOption = False,
-) -> None:
-    """Write tables, pictures and one HTML page of the studies in some folders."""
-    from planners.bench.report import write_report
-
-    check_folder(out)
-    written = [str(path) for path in write_report(folders, out)]
-    print_outcome(as_json, {"written": written}, lambda: print("\n".join(written)))
+for _panel, _name, _command, _examples in (
+    (
+        PLANNING,
+        "demo",
+        demo_command,
+        ["hrsnake demo"],
+    ),
+    (
+        PLANNING,
+        "plan",
+        plan_command,
+        [
+            "hrsnake plan fig19 --link-length 430 --out m.npz",
+            "hrsnake plan fig19 --link-length 445 --picture why.png",
+        ],
+    ),
+    (
+        PLANNING,
+        "validate",
+        validate_command,
+        ["hrsnake validate fig19 m.npz"],
+    ),
+    (
+        PLANNING,
+        "simulate",
+        simulate_command,
+        ["hrsnake simulate fig19 m.npz --replay m.html"],
+    ),
+    (
+        PLANNING,
+        "longest",
+        longest_command,
+        ["hrsnake longest fig19 --plot links.png --state fig19.json"],
+    ),
+    (
+        OWN,
+        "studio",
+        studio_command,
+        ["hrsnake studio", "hrsnake studio duct.geojson --port 9000 --no-browser"],
+    ),
+    (
+        OWN,
+        "import",
+        import_command,
+        [
+            "hrsnake import duct.yaml --picture duct.png",
+            "hrsnake import duct.yaml --base 0.1,0.5,0 --goal 10,0.5 --out duct.geojson",
+            "hrsnake import casing.svg --units mm --walls vanes --out casing.geojson",
+        ],
+    ),
+    (
+        OWN,
+        "export",
+        export_command,
+        [
+            "hrsnake export duct.geojson duct.npz --out duct.yaml --joint-speed 45",
+            "hrsnake export fig19 m.npz --out arm.urdf --metres-per-unit 0.001",
+        ],
+    ),
+    (OWN, "draw", draw_command, ["hrsnake draw fig19 m.npz --out fig19.png"]),
+    (LEARNING, "play", play_command, ["hrsnake play fig19"]),
+    (LEARNING, "dataset", dataset_command, ["hrsnake dataset arm/planner-v0 --episodes 50"]),
+    (
+        LEARNING,
+        "train",
+        train_command,
+        ["hrsnake train HyperRedundantMaze-UTurn-I30-v0 --method sac --out run"],
+    ),
+    (LEARNING, "evaluate", evaluate_command, ["hrsnake evaluate u-turn-i60-ppo-planned"]),
+):
+    app.command(_name, rich_help_panel=_panel, epilog=examples(_examples))(_command)
+app.add_typer(spatial_app, name="spatial", rich_help_panel=MORE)
+app.add_typer(bench_app, name="bench", rich_help_panel=MORE)
 
 
 def main() -> None:
     """Run the command line: one sentence on stderr and exit code 2 for bad input, no traceback."""
     try:
-        code = app(standalone_mode=False)
+        code = app(prog_name="hrsnake", standalone_mode=False)
     except InputError as error:
         sys.exit(_complain(str(error)))
     except UsageError as error:
@@ -564,23 +405,6 @@ def _complain(message: str) -> int:
 def _arm(link_length: float, links: int | None, link_radius: float, joint_limit: float | None) -> ArmSpec:
     limit = radians(joint_limit)
     return ArmSpec(link_length=link_length, n_links=links, link_radius=link_radius, joint_limit=limit)
-
-
-def _parts(text: str, every: tuple[str, ...], out: Path | None) -> tuple[str, ...]:
-    """Read which parts of a benchmark are wanted; refuse a file that could not be written first."""
-    check_output(out, (".json",))
-    return tuple(part.strip() for part in text.split(",")) if text else every
-
-
-def _publish(
-    results: dict[str, Any], markdown: Callable[[dict[str, Any]], str], out: Path | None, as_json: bool
-) -> None:
-    """Write the results of a benchmark, and print them."""
-    from planners.bench.records import write_results
-
-    if out is not None:
-        write_results(results, out)
-    print_outcome(as_json, results, lambda: print(markdown(results)))
 
 
 def _write_longest(

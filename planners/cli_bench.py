@@ -1,18 +1,28 @@
-"""The commands of `hrsnake bench` that compare methods over studies, and go on where they were stopped."""
+"""The commands of `hrsnake bench`: studies that compare methods, and what measures this project itself."""
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from hrsnake_env.errors import InputError
-from planners.cli_tools import INTERRUPTED
+from planners.cli_tools import (
+    INTERRUPTED,
+    PICTURES,
+    JsonOption,
+    check_folder,
+    check_output,
+    print_outcome,
+)
 
-__all__ = ["add_studies"]
+__all__ = ["bench_app"]
+
+bench_app = typer.Typer(help="Measure, and print tables to paste.", no_args_is_help=True)
 
 HELP = {
     "ladder": "Compare all methods on the ladder of tasks, and on random mazes that are held out.",
@@ -20,12 +30,6 @@ HELP = {
     "links": "Compare planners over the number of links, in U-turns with legs of any length.",
     "tightest": "Find the largest index at which each planner has a valid motion.",
 }
-
-
-def add_studies(app: typer.Typer) -> None:
-    """Add a command for each study."""
-    for study, text in HELP.items():
-        app.command(study, help=f"{text} Ctrl-C: stop; the same command goes on.")(_command(study))
 
 
 def _command(study: str) -> Callable[..., None]:
@@ -101,6 +105,119 @@ def _command(study: str) -> Callable[..., None]:
     return command
 
 
+for _study, _text in HELP.items():
+    bench_app.command(_study, help=f"{_text} Ctrl-C: stop; the same command goes on.")(_command(_study))
+
+
+@bench_app.command("speed")
+def bench_speed_command(
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Fewer and smaller mazes: under a minute, not ten.")
+    ] = False,
+    parts: Annotated[str, typer.Option("--parts", help="Some of the parts, as stages,links.")] = "",
+    out: Annotated[Path | None, typer.Option("--out", help="Write all figures (.json).")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure speed and scale: stages, growth, memory, first call, random mazes, and OMPL beside."""
+    from planners.bench import speed
+    from planners.bench.speed_tables import speed_markdown
+
+    sizes = speed.QUICK if quick else speed.FULL
+    chosen = _parts(parts, speed.PARTS, out)
+    _publish(speed.run_speed(sizes, parts=chosen, quiet=as_json), speed_markdown, out, as_json)
+
+
+@bench_app.command("paper")
+def bench_paper_command(
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer lengths and mazes: under a minute.")] = False,
+    parts: Annotated[str, typer.Option("--parts", help="Some of the parts, as poses,index.")] = "",
+    out: Annotated[Path | None, typer.Option("--out", help="Write all figures (.json).")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure the paper's results: workspaces, time per pose, growth, index, families, and its rules."""
+    from planners.bench import paper
+    from planners.bench.paper_tables import paper_markdown
+
+    sizes = paper.QUICK if quick else paper.FULL
+    chosen = _parts(parts, paper.PARTS, out)
+    _publish(paper.run_paper(sizes, parts=chosen, quiet=as_json), paper_markdown, out, as_json)
+
+
+@bench_app.command("spatial")
+def bench_spatial_command(
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer rooms, lengths and repeats.")] = False,
+    parts: Annotated[str, typer.Option("--parts", help="Some of the parts, as figures,rooms.")] = "",
+    out: Annotated[Path | None, typer.Option("--out", help="Write all figures (.json).")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure in space: the paper's figures, longest links, random rooms, growth, radius, joint limits."""
+    from planners.bench import spatial
+    from planners.bench.spatial_tables import spatial_markdown
+
+    sizes = spatial.QUICK if quick else spatial.FULL
+    chosen = _parts(parts, spatial.PARTS, out)
+    _publish(spatial.run_spatial(sizes, parts=chosen, quiet=as_json), spatial_markdown, out, as_json)
+
+
+@bench_app.command("env")
+def bench_env_command(
+    quick: Annotated[bool, typer.Option("--quick", help="Shorter windows, fewer mazes and steps.")] = False,
+    parts: Annotated[str, typer.Option("--parts", help="Some of the parts, as peers,where.")] = "",
+    random_steps: Annotated[
+        int | None, typer.Option("--random-steps", min=1, help="Of all random policies together.")
+    ] = None,
+    peers_python: Annotated[
+        Path | None, typer.Option("--peers-python", help="A Python with gym-pusht and MuJoCo.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="Write all figures (.json), and random runs to go on from (.jsonl)."),
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", help="Draw where a step's time goes (.png, .svg, .pdf).")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure the environment: speed beside peers, a step's pieces, resets, vectors, random policies."""
+    from planners.bench import environment
+    from planners.bench.environment_tables import environment_markdown
+    from planners.bench.records import write_results
+
+    check_output(picture, PICTURES)
+    sizes = environment.QUICK if quick else environment.FULL
+    if random_steps is not None:
+        sizes = dataclasses.replace(sizes, random_steps=random_steps)
+    results = environment.run_environment(
+        sizes,
+        parts=_parts(parts, environment.PARTS, out),
+        peers=peers_python,
+        rows=None if out is None else out.with_suffix(".jsonl"),
+        keep=lambda done: None if out is None else write_results(done, out),
+        quiet=as_json,
+    )
+    if picture is not None and "where" in results:
+        from planners.bench.environment_chart import draw_where
+
+        draw_where(results["where"], picture)
+    _publish(results, environment_markdown, out, as_json)
+    if "stopped" in results:
+        raise typer.Exit(INTERRUPTED)
+
+
+@bench_app.command("report")
+def bench_report_command(
+    folders: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Of studies, with their rows.")],
+    out: Annotated[Path, typer.Option("--out", help="Folder for the report; made if missing.")],
+    as_json: JsonOption = False,
+) -> None:
+    """Write tables, pictures and one HTML page of the studies in some folders."""
+    from planners.bench.report import write_report
+
+    check_folder(out)
+    written = [str(path) for path in write_report(folders, out)]
+    print_outcome(as_json, {"written": written}, lambda: print("\n".join(written)))
+
+
 def _words(text: str) -> list[str]:
     return [word.strip() for word in text.split(",") if word.strip()]
 
@@ -110,3 +227,20 @@ def _numbers(text: str) -> list[int]:
         return [int(word) for word in _words(text)]
     except ValueError:
         raise InputError(f"Expected seeds as whole numbers with commas (0,1,2), got '{text}'.") from None
+
+
+def _parts(text: str, every: tuple[str, ...], out: Path | None) -> tuple[str, ...]:
+    """Read which parts of a benchmark are wanted; refuse a file that could not be written first."""
+    check_output(out, (".json",))
+    return tuple(part.strip() for part in text.split(",")) if text else every
+
+
+def _publish(
+    results: dict[str, Any], markdown: Callable[[dict[str, Any]], str], out: Path | None, as_json: bool
+) -> None:
+    """Write the results of a benchmark, and print them."""
+    from planners.bench.records import write_results
+
+    if out is not None:
+        write_results(results, out)
+    print_outcome(as_json, results, lambda: print(markdown(results)))

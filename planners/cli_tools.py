@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,18 +13,25 @@ from typing import Annotated, Any
 import typer
 
 from hrsnake_env.errors import InputError
+from hrsnake_env.maze import MAZES
+from planners.planning import PLANNERS
 from planners.problem import Progress
 
 __all__ = [
     "BAD_INPUT",
     "INTERRUPTED",
+    "MAZE_HELP",
     "NOT_CLEAN",
     "PICTURES",
     "JsonOption",
     "LimitOption",
+    "MazeArgument",
+    "MotionArgument",
+    "PlannerOption",
     "RadiusOption",
     "check_folder",
     "check_output",
+    "examples",
     "lengths_in",
     "name_of",
     "one_bar",
@@ -39,9 +46,32 @@ INTERRUPTED = 130
 
 PICTURES = (".png", ".svg", ".pdf")
 
+
+def mazes_named(incomplete: str) -> list[str]:
+    """Return the mazes and maze files whose names begin so, for the shell's completion."""
+    files = [str(path) for ending in (".geojson", ".json") for path in Path().glob(f"*{ending}")]
+    return [name for name in (*MAZES, *sorted(files)) if name.startswith(incomplete)]
+
+
+def planners_named(incomplete: str) -> list[str]:
+    """Return the planners whose names begin so, for the shell's completion."""
+    return [name for name in ("auto", *PLANNERS) if name.startswith(incomplete)]
+
+
+MAZE_HELP = f"A .geojson file, or one of: {', '.join(MAZES)}."
+MazeArgument = Annotated[str, typer.Argument(metavar="MAZE", help=MAZE_HELP, autocompletion=mazes_named)]
+MotionArgument = Annotated[Path, typer.Argument(metavar="MOTION", help="A motion (.npz).")]
+PlannerOption = Annotated[
+    str, typer.Option("--planner", help=f"auto, {', '.join(PLANNERS)}.", autocompletion=planners_named)
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")]
 RadiusOption = Annotated[float, typer.Option("--link-radius", help="Radius of the links, in the same units.")]
 LimitOption = Annotated[float | None, typer.Option("--joint-limit", help="Largest joint angle, in degrees.")]
+
+
+def examples(lines: Sequence[str]) -> str:
+    """Return the end of a help page: one example to a line."""
+    return "\n\n".join([f"Example{'s' if len(lines) > 1 else ''}:", *(f"  {line}" for line in lines)])
 
 
 def radians(joint_limit: float | None) -> float | None:

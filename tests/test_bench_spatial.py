@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
-from planners.bench import spatial
+from planners.bench import spatial, spatial_trials
 from planners.bench.records import write_results
 from planners.bench.spatial import PARTS, QUICK, compared, rooms_with_a_way, run_spatial
 from planners.bench.spatial_growth import STAGES, time_stages
@@ -56,6 +56,8 @@ def results():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(spatial, "bar", counting_bar)
         patch.setattr(spatial, "PAPER_LENGTHS", (30.0, 90.0))
+        patch.setattr(spatial_trials, "HORIZON_LENGTHS", (50.0, 70.0, 130.0))
+        patch.setattr(longest, "SHORTEST", 0.05)
         patch.setattr(longest, "STEP", 1.8)
         patch.setattr(longest, "BEYOND", 1)
         return run_spatial(TINY, workers=0, quiet=True)

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import fig19
 from planners import Motion, PlanningResult, PlanningStatus, plan
-from planners.cli import main
+from planners.cli import app, main
 from planners.drawing import draw_failure
 from planners.problem import Failure
 from planners.tables import show_plan
@@ -154,7 +155,8 @@ def test_longest_leaves_no_file_unless_asked(run):
 
 
 def test_longest_is_exit_code_3_where_no_length_passes(run):
-    code, out, _ = run(*QUICKLY, "--joint-limit", 1, "--out", "m.npz", "--plot", "l.svg")
+    settings = ["--planner", "sweep", "--accuracy", 0.5, "--joint-limit", 1]
+    code, out, _ = run("longest", "L", *settings, "--out", "m.npz", "--plot", "l.svg")
     assert code == 3 and "no length that was tried passes" in " ".join(out.split())
     assert sorted(path.name for path in Path().iterdir()) == ["l.svg"]
 
@@ -373,3 +375,47 @@ def test_a_maze_file_is_planned_like_a_named_maze(run):
     named = run("plan", "U200", "--link-length", 300, "--json")
     assert code == named[0] == 0
     assert json.loads(out)["n_poses"] == json.loads(named[1])["n_poses"]
+
+
+def commands(group=None, path=()):
+    """Yield each command with its name."""
+    for name, command in (group or typer.main.get_command(app)).commands.items():
+        if hasattr(command, "commands"):
+            yield from commands(command, (*path, name))
+        else:
+            yield (*path, name), command
+
+
+def test_every_example_of_the_help_is_a_command_that_is_understood():
+    shown = [
+        line.split()
+        for _, command in commands()
+        for line in (command.epilog or "").splitlines()
+        if line.strip().startswith("hrsnake ")
+    ]
+    named = dict(commands())
+    assert len(shown) >= 11
+    for _, *words in shown:
+        name = max((name for name in named if words[: len(name)] == [*name]), key=len)
+        arguments = words[len(name) :]
+        assert named[name].make_context(name[-1], arguments).command is named[name]
+
+
+def test_the_shell_completes_mazes_files_and_planners(run, monkeypatch):
+    Path("figures.geojson").write_text("{}")
+    monkeypatch.setenv("_HRSNAKE_COMPLETE", "complete_bash")
+
+    def completed(line):
+        monkeypatch.setenv("COMP_WORDS", line)
+        monkeypatch.setenv("COMP_CWORD", str(len(line.split(" ")) - 1))
+        return run()[1].split()
+
+    assert completed("hrsnake plan fig1") == ["fig19", "fig17a", "fig17b", "fig17c", "fig17d"]
+    assert completed("hrsnake plan figu") == ["figures.geojson"]
+    assert completed("hrsnake plan fig19 --planner as") == ["as-printed"]
+
+
+def test_a_map_that_is_given_as_a_maze_is_to_be_imported_first(run):
+    Path("duct.svg").write_text("<svg/>")
+    code, _, err = run("plan", "duct.svg", "--link-length", 1)
+    assert code == 2 and "`hrsnake import duct.svg --out maze.geojson`" in err

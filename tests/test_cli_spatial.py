@@ -8,7 +8,7 @@ import pytest
 
 from hrsnake_env.arm import ArmSpec
 from planners.cli import main
-from planners.spatial import SpatialMotion, Workspace, load_workspace, plan
+from planners.spatial import SpatialMotion, Workspace, load_workspace, longest, plan
 
 
 def small_room(**changes):
@@ -107,7 +107,9 @@ def test_a_motion_in_an_obstacle_ends_validation_with_3(run, room, tmp_path):
     assert code == 3 and "NOT VALID" in out and "deep in an obstacle" in " ".join(out.split())
 
 
-def test_longest_is_found_and_its_motion_written(run, room, tmp_path):
+def test_longest_is_found_and_its_motion_written(run, room, tmp_path, monkeypatch):
+    for name, value in (("SHORTEST", 0.05), ("STEP", 1.3), ("BEYOND", 1)):  # few and large steps
+        monkeypatch.setattr(longest, name, value)
     code, out, _ = run("longest", "small.json", "--accuracy", 0.1, "--out", "m.npz", "--json")
     data = json.loads(out)
     motion = SpatialMotion.load(tmp_path / "m.npz")

@@ -16,6 +16,24 @@ def outputs(notebook):
     return [output for cell in notebook.cells for output in cell.get("outputs", ())]
 
 
+def title_of(path):
+    return next(line for line in path.read_text().splitlines() if line.startswith("# # ")).removeprefix(
+        "# # "
+    )
+
+
+def row_of(path):
+    """Return what stands in front of the notebook's name in the index."""
+    lines = (ROOT / "notebooks" / "README.md").read_text().splitlines()
+    return next(line for line in lines if f"[{path.stem}]({path.name})" in line).split("|")[1]
+
+
+def figures_in(text):
+    """Return the paper's figures that a title or the index names, a range with all between its ends."""
+    numbers = [int(number) for number in re.findall(r"\d+", text)]
+    return list(range(numbers[0], numbers[-1] + 1)) if numbers and " to " in text else numbers
+
+
 def test_there_are_notebooks():
     assert NOTEBOOKS
 
@@ -30,19 +48,12 @@ def test_a_notebook_runs_without_a_warning_and_draws_figures(path):
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_a_notebooks_title_names_a_figure_of_the_paper(path):
-    title = next(line for line in path.read_text().splitlines() if line.startswith("# # "))
-    assert re.match(r"# # Figs?\. \d+", title), title
-
-
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_the_index_names_every_notebook_with_its_figures(path):
-    title = next(line for line in path.read_text().splitlines() if line.startswith("# # ")).partition(":")[0]
-    first, last = (int(figure) for figure in (re.findall(r"\d+", title)[0], re.findall(r"\d+", title)[-1]))
-    lines = (ROOT / "notebooks" / "README.md").read_text().splitlines()
-    row = next(line for line in lines if f"[{path.stem}]({path.name})" in line)
-    listed = [int(figure) for figure in re.findall(r"\d+", row.split("|")[1])]
-    assert listed[0] == first and listed[-1] == last
+    assert figures_in(row_of(path)) == figures_in(title_of(path).partition(":")[0])
+
+
+def test_every_figure_of_the_paper_is_in_a_notebook():
+    assert sorted(figure for path in NOTEBOOKS for figure in figures_in(row_of(path))) == list(range(1, 23))
 
 
 def test_a_cell_that_fails_fails_the_notebook(tmp_path):
@@ -53,5 +64,5 @@ def test_a_cell_that_fails_fails_the_notebook(tmp_path):
 
 
 def test_a_name_that_no_notebook_has_is_refused():
-    with pytest.raises(SystemExit, match="there are: 01_path_and_windowing"):
+    with pytest.raises(SystemExit, match="there are: 00_quick_start"):
         RUNNER["main"](["99"])

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from planners import PlanningStatus
+from planners.kernels.spatial_track import overlap
 from planners.spatial.panel import Panel
 from planners.spatial.path import Path
 from planners.spatial.planning import PLANNERS, plan
@@ -125,6 +127,12 @@ def solved(workspace, planner="track", **arm):
     return result
 
 
+@cache
+def through_two_panels(planner="track", length=40.0):
+    """Return a plan through the two panels, which many laws compare with."""
+    return solved(two_panels(), planner, link_length=length)
+
+
 # What is solved
 
 
@@ -223,7 +231,7 @@ def test_units_do_not_matter(scale):
 @pytest.mark.parametrize("planner", PLANNERS)
 def test_the_order_of_the_axes_does_not_matter(order, planner):
     length = 40.0 if planner == "track" else 20.0
-    plain = solved(two_panels(), planner, link_length=length)
+    plain = through_two_panels(planner, length)
     other = solved(mapped(two_panels(), order), planner, link_length=length)
     assert other.motion.n_links == plain.motion.n_links
     # The causal planner rounds lengths to samples, so it may have one more or less.
@@ -237,7 +245,7 @@ def test_the_order_of_the_axes_does_not_matter(order, planner):
 @pytest.mark.parametrize("axis", [1, 2])
 def test_the_mirror_image_of_a_room_has_the_mirrored_track(axis):
     other, turned = mirrored(two_panels(), axis)
-    one, other = solved(two_panels(), link_length=40.0), solved(other, link_length=40.0)
+    one, other = through_two_panels(), solved(other, link_length=40.0)
     assert other.motion.n_links == one.motion.n_links
     index = np.linspace(0.0, 1.0, 300)
     mine, theirs = (
@@ -251,7 +259,7 @@ def test_the_mirror_image_of_a_room_has_the_mirrored_track(axis):
 
 
 def test_more_links_than_needed_stay_in_the_feeder():
-    fewest = solved(two_panels(), link_length=40.0).motion
+    fewest = through_two_panels().motion
     result = solved(two_panels(), link_length=40.0, n_links=fewest.n_links + 5)
     assert result.motion.n_links == fewest.n_links + 5
     np.testing.assert_allclose(result.motion.joints[:, 5:], fewest.joints, atol=1e-6)
@@ -259,7 +267,7 @@ def test_more_links_than_needed_stay_in_the_feeder():
 
 
 def test_fewer_links_than_needed_are_refused_with_the_number_that_is():
-    fewest = solved(two_panels(), link_length=40.0).motion.n_links
+    fewest = through_two_panels().motion.n_links
     message = rf"Expected at least {fewest} links of 40 units to reach .* 'room', got {fewest - 1}\."
     with pytest.raises(InputError, match=message):
         plan(two_panels(), ArmSpec(link_length=40.0, n_links=fewest - 1))
@@ -300,13 +308,16 @@ def test_links_too_long_for_the_room_end_in_a_dead_end_that_says_where():
 
 def test_a_dead_end_of_thick_links_counts_their_radius_and_names_the_joint_limit():
     workspace = two_panels()
-    arm = ArmSpec(link_length=70.0, link_radius=4.0, joint_limit=math.radians(50.0))
+    arm = ArmSpec(link_length=80.0, link_radius=4.0, joint_limit=math.radians(30.0))
     result = plan(workspace, arm)
-    assert result.status is PlanningStatus.DEAD_END and "joints of at most 50 degrees" in result.reason
+    assert result.status is PlanningStatus.DEAD_END and "joints of at most 30 degrees" in result.reason
     low, high = workspace.obstacles[result.failure.wall]
     a, b = result.failure.joints
     link = a + np.linspace(0.0, 1.0, 2001)[:, None] * (b - a)
     assert ((link > low - 4.0) & (link < high + 4.0)).all(axis=1).any()
+    # How far the link is from being free is how deep its axis is in the box that its radius is added to.
+    thin, thick = (overlap(*a, *b, np.array([[low - grown, high + grown]]), 0)[0] for grown in (0.0, 4.0))
+    assert result.failure.depth == pytest.approx(thick) and thin < thick - 1.0
 
 
 def test_a_track_that_only_grows_is_a_dead_end_even_without_obstacles():
@@ -336,7 +347,7 @@ def test_without_time_the_plan_is_out_of_time(planner):
 
 
 def test_a_motion_that_the_checker_refuses_is_never_handed_out(monkeypatch):
-    good = solved(two_panels(), link_length=40.0)
+    good = through_two_panels()
 
     def through_the_wall(query):
         joints = good.motion.joints + np.array([0.0, 0.0, 4.0]) * (good.motion.joints[..., :1] > 60.0)

@@ -14,7 +14,13 @@ from shapely.geometry import MultiPolygon, Point, Polygon
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 
-__all__ = ["MapFiles", "MapOptions", "MapReading", "files_beside"]
+__all__ = ["MapFiles", "MapOptions", "MapReading", "files_beside", "scale_and_units"]
+
+METRES = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "um": 1e-6, "km": 1000.0, "in": 0.0254, "ft": 0.3048}
+"""Units that maps name."""
+
+MAX_BYTES = 512_000_000
+"""Of a file."""
 
 GOAL_SHARE = 0.25
 """Radius of a goal that none was given for, as a share of its distance to the nearest wall."""
@@ -29,13 +35,49 @@ def files_beside(path: Path) -> MapFiles:
     def read(name: str) -> bytes:
         target = path.parent / name
         try:
+            if target.exists() and not target.is_file():
+                raise InputError(f"Expected a file at '{target}', got a folder or a device.")
+            if target.stat().st_size > MAX_BYTES:
+                raise InputError(f"Expected a file of at most {MAX_BYTES:,} bytes at '{target}', got more.")
             return target.read_bytes()
         except FileNotFoundError:
             raise InputError(f"Expected a file at '{target}', but there is none.") from None
+        except ValueError as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"Expected the name of a file, got {name!r}.") from None
         except OSError as error:
             raise InputError(f"Expected a readable file at '{target}', got: {error.strerror}.") from None
 
     return read
+
+
+def scale_and_units(units: str, options: MapOptions) -> tuple[float, str]:
+    """Return the maze units per unit of a map, and their name.
+
+    Parameters
+    ----------
+    units : str
+        Of the map.
+    options : MapOptions
+        What the user wants.
+
+    Examples
+    --------
+    >>> scale_and_units("m", MapOptions(units="mm"))
+    (1000.0, 'mm')
+    >>> scale_and_units("m", MapOptions(scale=100.0))
+    (100.0, 'cm')
+    """
+    scale, wanted = options.scale, options.units
+    if wanted is None:
+        sizes = {name: METRES.get(units, math.nan) / size for name, size in METRES.items()}
+        named = [name for name, size in sizes.items() if math.isclose(size, scale, rel_tol=1e-9)]
+        return scale, units if scale == 1.0 else (named[0] if named else f"{1.0 / scale:g} {units}")
+    if scale == 1.0 and units in METRES and wanted in METRES:
+        digits = METRES[units] / METRES[wanted]
+        return float(f"{digits:.12g}"), wanted
+    return scale, wanted
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,10 +89,12 @@ class MapOptions:
     units : str, optional
         Of the maze. By default the map's own, as far as it names them: m of a ROS map, px of an image.
     scale : float
-        Maze units per unit of the map; 1000 turns m into mm.
+        Maze units per unit of the map; 1000 turns m into mm. If it is 1, a map that names its units is
+        converted to `units`.
     tolerance : float, optional
         How far a wall may be moved into the free space to simplify an outline, in maze units; 0 keeps every
-        corner. By default half a pixel, or 1e-4 of an outline's size.
+        corner. By default 1.5 pixels, which makes straight walls of the staircases of pixels along slanted
+        ones and leaves walls along the pixels where they are; or 1e-4 of an outline's size.
     resolution : float, optional
         Side of a pixel in units of the map, for images that do not say it; 1 by default.
     threshold : float, optional

@@ -1,0 +1,193 @@
+"""Free space out of closed outlines: areas, what lies in what, and walls between rooms that touch."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely import STRtree
+from shapely.geometry import MultiPolygon, Polygon
+
+from hrsnake_env.arm import FloatArray
+from hrsnake_env.errors import InputError
+
+__all__ = ["MAX_CROSSINGS", "Nesting", "check_crossings", "even_odd", "filled", "nested", "odd", "polygons"]
+
+
+MAX_CROSSINGS = 20_000
+"""Of one outline with itself: more of them are a scribble, and take minutes."""
+
+N_PROBES = 500
+
+
+def check_crossings(points: FloatArray) -> None:
+    """Check that a line does not cross itself too often, as far as some of its sides tell.
+
+    Raises
+    ------
+    InputError
+        If it does.
+    """
+    n = len(points) - 1
+    if n * n < 2 * MAX_CROSSINGS:
+        return
+    sides = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1))
+    probes = sides[:: max(1, n // N_PROBES)]
+    hits = len(STRtree(sides).query(probes, predicate="crosses")[0])
+    if hits * n / len(probes) > 2 * MAX_CROSSINGS:
+        raise InputError(
+            f"Expected outlines that cross themselves at most {MAX_CROSSINGS:,} times, got a scribble."
+        )
+
+
+def polygons(geometry: shapely.Geometry) -> list[Polygon]:
+    """Return the polygons of a geometry, without lines and points."""
+    found = []
+    for part in shapely.get_parts(geometry):
+        if isinstance(part, Polygon):
+            if part.area > 0.0:
+                found.append(part)
+        elif part.geom_type.startswith(("Multi", "Geometry")):
+            found += polygons(part)
+    return found
+
+
+def even_odd(rings: Sequence[FloatArray]) -> MultiPolygon | Polygon:
+    """Return the area of rings, shape (n, 2) each, by the even-odd rule, that of crossing ones too."""
+    areas = [
+        shapely.union_all(polygons(shapely.make_valid(Polygon(ring), method="linework"))) for ring in rings
+    ]
+    return odd(areas)
+
+
+def odd(areas: Sequence[shapely.Geometry]) -> MultiPolygon | Polygon:
+    """Return what an odd number of areas covers."""
+    return functools.reduce(shapely.symmetric_difference, areas)
+
+
+def filled(ring: FloatArray) -> MultiPolygon | Polygon:
+    """Return all that a ring encloses, shape (n, 2), that of a crossing one too: nothing is missing."""
+    area = Polygon(ring)
+    if area.is_valid:
+        return area
+    faces = shapely.get_parts(shapely.polygonize([shapely.node(area.exterior)]))
+    whole = polygons(shapely.union_all(faces))
+    return shapely.union_all([Polygon(part.exterior) for part in whole])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Nesting:
+    """Hold what became of closed outlines, in their order.
+
+    Parameters
+    ----------
+    free_space : Polygon or MultiPolygon
+    free : array of bool
+        Which outlines bound free space from outside.
+    twice : array of bool
+        Which repeat another.
+    crossing : array of bool
+        Which cross a larger one, and are obstacles therefore.
+    """
+
+    free_space: Polygon | MultiPolygon
+    free: np.ndarray
+    twice: np.ndarray
+    crossing: np.ndarray
+
+
+def nested(rings: Sequence[FloatArray], is_wall: Sequence[bool], gap: float, thickness: float) -> Nesting:
+    """Return the free space of a floor plan.
+
+    Outermost outlines bound free space, outlines within them are obstacles, outlines within those bound free
+    space again, and so on. A wall within anything is an obstacle. What crosses a larger outline of free space
+    is an obstacle, for that never makes the free space larger. Where free spaces touch, a wall is between
+    them.
+
+    Parameters
+    ----------
+    rings : sequence of arrays, shape (n, 2)
+    is_wall : sequence of bool
+        The outline is said to be a wall.
+    gap : float
+        Overlaps thinner than this are none.
+    thickness : float
+        Of the walls between free spaces that touch.
+    """
+    areas = np.array([filled(ring) for ring in rings], dtype=object)
+    inner, outer, cross_small, cross_large, twice = _relations(areas, gap)
+    size = shapely.area(areas)
+    parent = np.full(len(areas), -1)
+    for i in np.argsort(-size[outer], kind="stable"):  # the smallest around it comes last
+        parent[inner[i]] = outer[i]
+    free = np.zeros(len(areas), dtype=bool)
+    crossing = np.zeros(len(areas), dtype=bool)
+    crossed: dict[int, list[int]] = {}
+    for small, large in zip(cross_small, cross_large, strict=True):
+        crossed.setdefault(int(small), []).append(int(large))
+    for i in np.argsort(-size, kind="stable"):
+        outermost = parent[i] < 0
+        free[i] = not twice[i] and (outermost or (not free[parent[i]] and not is_wall[i]))
+        crossing[i] = free[i] and any(free[j] for j in crossed.get(int(i), ()))
+        free[i] &= not crossing[i]
+    around = set(zip(inner.tolist(), outer.tolist(), strict=True))
+    obstacles = np.flatnonzero(~free & ~twice)
+    tree = STRtree(areas[obstacles])
+    rooms = []
+    for i in np.flatnonzero(free).tolist():
+        near = [
+            j
+            for j in obstacles[tree.query(areas[i], predicate="intersects")].tolist()
+            if (i, j) not in around
+        ]
+        rooms.append(shapely.difference(even_odd([rings[i]]), shapely.disjoint_subset_union_all(areas[near])))
+    return Nesting(free_space=_apart(rooms, thickness), free=free, twice=twice, crossing=crossing)
+
+
+def _relations(areas: np.ndarray, gap: float) -> tuple[np.ndarray, ...]:
+    """Return who lies in whom (inner, outer), who crosses whom (smaller, larger), and who is there twice."""
+    tree = STRtree(areas)
+    outer, inner = tree.query(areas, predicate="covers")
+    a, b = tree.query(areas, predicate="overlaps")
+    a, b = a[a < b], b[a < b]
+    common = shapely.area(shapely.intersection(areas[a], areas[b]))
+    sliver = gap * np.minimum(shapely.length(areas[a]), shapely.length(areas[b]))
+    size = shapely.area(areas)
+    a_in_b, b_in_a = size[a] - common <= sliver, size[b] - common <= sliver
+    alike = size[outer] - size[inner] <= gap * shapely.length(areas[inner])
+    inner, outer = (
+        np.concatenate([inner, outer[alike], a[a_in_b], b[b_in_a]]),
+        np.concatenate([outer, inner[alike], b[a_in_b], a[b_in_a]]),
+    )
+    both = set(zip(inner.tolist(), outer.tolist(), strict=True))
+    twice = np.zeros(len(areas), dtype=bool)
+    for i, j in both:
+        if i > j and (j, i) in both:
+            twice[i] = True
+    real = (inner != outer) & ~twice[inner] & ~twice[outer]
+    cross = (common > sliver) & ~a_in_b & ~b_in_a & ~twice[a] & ~twice[b]
+    a, b = a[cross], b[cross]
+    swap = size[a] > size[b]
+    return inner[real], outer[real], np.where(swap, b, a), np.where(swap, a, b), twice
+
+
+def _apart(rooms: list[Polygon | MultiPolygon], thickness: float) -> Polygon | MultiPolygon:
+    """Return rooms as one geometry, with walls where two of them touch."""
+    tree = STRtree(rooms)
+    a, b = tree.query(rooms, predicate="intersects")
+    walls: dict[int, list[shapely.Geometry]] = {}
+    for i, j in zip(a[a < b].tolist(), b[a < b].tolist(), strict=True):
+        shared = shapely.intersection(rooms[i].boundary, rooms[j].boundary)
+        walls.setdefault(j, []).append(rooms[i])
+        if shared.length > 0.0:
+            wall = shapely.buffer(shared, 0.5 * thickness, cap_style="flat", join_style="mitre")
+            walls.setdefault(i, []).append(wall)
+            walls[j].append(wall)
+    parts = [
+        shapely.difference(room, shapely.union_all(walls[i])) if i in walls else room
+        for i, room in enumerate(rooms)
+    ]
+    return shapely.union_all(parts)
