@@ -2,7 +2,8 @@
 
 Run with `.venv/bin/python benchmarks/maps.py` from the repository's root. The images are floor plans with
 pillars and slanted walls, drawn from seeds. Each is read and planned in a process of its own, and again in
-that process. A first process, which is not counted, compiles the kernels. Prints a table and writes `benchmarks/results/maps.json`.
+that process. A first process, which is not counted, compiles the kernels. Prints a table and writes
+`benchmarks/results/maps.json`.
 """
 
 from __future__ import annotations

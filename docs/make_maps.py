@@ -9,7 +9,7 @@ from pathlib import Path
 
 import ezdxf
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageDraw
 from shapely import contains_xy
 from shapely.geometry import LineString, Point, Polygon, box
 
@@ -117,9 +117,21 @@ def write_plan() -> None:
         document.saveas(part)
 
 
+def write_scan() -> None:
+    """Write the scan of a plan: four corridors and a pillar, bright on dark."""
+    sheet = Image.new("L", (900, 600), 40)
+    pen = ImageDraw.Draw(sheet)
+    for corridor in ((60, 60, 140, 540), (60, 60, 840, 140), (760, 60, 840, 540), (260, 460, 840, 540)):
+        pen.rectangle(corridor, fill=235)
+    pen.ellipse((420, 480, 460, 520), fill=40)
+    with replacing(MAPS / "scan.png") as part:
+        sheet.save(part, optimize=True)
+
+
 if __name__ == "__main__":
     MAPS.mkdir(exist_ok=True)
     write_ros_map()
     write_drawing()
+    write_scan()
     write_plan()
     print("\n".join(f"Written: docs/maps/{path.name}" for path in sorted(MAPS.iterdir())))

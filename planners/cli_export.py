@@ -34,14 +34,19 @@ from planners.export import (
     largest_shares,
     save_export,
 )
-from planners.problem import Motion
+from planners.problem import Motion, read_motion_arrays
+from planners.spatial.problem import SpatialMotion
+from planners.spatial.rooms import load_workspace
+from planners.spatial.workspace import Workspace
 
 __all__ = ["export_command"]
 
 
 def export_command(
-    maze: Annotated[str, typer.Argument(metavar="MAZE", help="A name, or a .geojson file.")],
-    motion: Annotated[Path, typer.Argument(metavar="MOTION", help="A motion (.npz) in that maze.")],
+    maze: Annotated[
+        str, typer.Argument(metavar="MAZE", help="A name or a file, as of plan or spatial plan.")
+    ],
+    motion: Annotated[Path, typer.Argument(metavar="MOTION", help="A motion (.npz) in it.")],
     out: Annotated[
         Path,
         typer.Option(
@@ -87,7 +92,7 @@ def export_command(
             None if feed_acceleration is None else _positive("--feed-acceleration", feed_acceleration)
         ),
     )
-    world, moved = Maze.load(maze), Motion.load(motion)
+    world, moved = _loaded(maze, motion)
     arm = ArmSpec(link_length=moved.link_length, link_radius=link_radius, joint_limit=radians(joint_limit))
     try:
         with progress_bars(as_json) as progress:
@@ -111,13 +116,22 @@ def export_command(
     print_outcome(as_json, data, lambda: _show(made, world, data))
 
 
+def _loaded(maze: str, motion: Path) -> tuple[Maze | Workspace, Motion | SpatialMotion]:
+    """Read a maze and a motion; where the motion is in space, a workspace."""
+    if read_motion_arrays(motion)["joint_angles"].ndim == 3:
+        return load_workspace(maze), SpatialMotion.load(motion)
+    return Maze.load(maze), Motion.load(motion)
+
+
 def _positive(option: str, value: float, factor: float = 1.0) -> float:
     if not 0.0 < value < math.inf:
         raise InputError(f"Expected a positive, finite {option}, got {value:g}.")
     return value * factor
 
 
-def _facts(made: Export, motion: Motion, limits: TrajectoryLimits, name: str, out: Path) -> dict[str, Any]:
+def _facts(
+    made: Export, motion: Motion | SpatialMotion, limits: TrajectoryLimits, name: str, out: Path
+) -> dict[str, Any]:
     data: dict[str, Any] = {"format": name, "out": str(out), "bytes": len(made.data)}
     if made.trajectory is not None:
         data |= {
@@ -131,10 +145,11 @@ def _facts(made: Export, motion: Motion, limits: TrajectoryLimits, name: str, ou
     return {**data, "validation": tables.validation_dict(made.report)}
 
 
-def _show(made: Export, maze: Maze, data: dict[str, Any]) -> None:
+def _show(made: Export, maze: Maze | Workspace, data: dict[str, Any]) -> None:
     rows = []
     if made.trajectory is not None:
-        shares, length = data["shares_of_limits"], made.trajectory.link_length
+        shares = data["shares_of_limits"]
+        off, off_in_links = data["deviation"], data["deviation"] / made.trajectory.link_length
         rows = [
             (
                 "duration",
@@ -147,7 +162,7 @@ def _show(made: Export, maze: Maze, data: dict[str, Any]) -> None:
             ),
             (
                 "off the motion",
-                f"at most {data['deviation']:.3g} {maze.units} ({data['deviation'] / length:.2g} link lengths)",
+                f"at most {off:.3g} {maze.units}, {off_in_links:.2g} link lengths",
             ),
         ]
     depth = made.report.penetration_between

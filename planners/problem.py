@@ -214,7 +214,7 @@ def read_motion_arrays(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
                     f"Expected a motion in '{path}' with the keys {', '.join(KEYS)}; "
                     f"missing: {', '.join(missing)}."
                 )
-            values = {key: data[key] for key in KEYS}
+            values = {key: np.asarray(data[key]) for key in KEYS}  # a member may be no array at all
     except FileNotFoundError:
         raise InputError(f"Expected a motion file at '{path}', but there is none.") from None
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:

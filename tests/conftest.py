@@ -2,6 +2,7 @@
 
 import os
 
+import pytest
 from hypothesis import settings
 
 # Windows open on a display that nobody sees; pygame reads this when it starts.
@@ -11,3 +12,13 @@ os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
 settings.register_profile("local", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "local")
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory):
+    """Return a headless Chromium, started for the first test that wants one."""
+    from browser import start_browser  # it needs what only some systems have
+
+    chromium = start_browser(tmp_path_factory.mktemp("browser"))
+    yield chromium
+    chromium.close()

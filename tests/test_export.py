@@ -28,17 +28,22 @@ from planners.export import (
     Trajectory,
     TrajectoryLimits,
     check_trajectory,
+    checking,
     export,
     export_bytes,
     fastest_duration,
     format_for,
     largest_shares,
+    rounding,
     safe_trajectory,
     save_export,
     time_parametrise,
 )
+from planners.export.kinematics import configurations, kinematics_of
 from planners.export.units import METRES, metres_in
+from planners.export.urdf import urdf_bytes
 from planners.problem import Motion
+from planners.spatial.problem import SpatialMotion
 
 MAZE = Maze.load("L")
 LINK = 300.0
@@ -58,7 +63,7 @@ def trajectory(motion: Motion) -> Trajectory:
 
 
 def cubic(trajectory: Trajectory) -> CubicHermiteSpline:
-    """What a controller drives that interpolates positions and velocities."""
+    """Return what a controller drives that interpolates positions and velocities."""
     positions, velocities, _ = trajectory.table()
     return CubicHermiteSpline(trajectory.time, positions, velocities)
 
@@ -108,7 +113,6 @@ def test_a_trajectory_keeps_to_the_way_of_the_motion_in_its_order(motion: Motion
     deviation = 1e-3
     trajectory = time_parametrise(motion, LIMITS, deviation=deviation, rate=200.0)
     joints = joints_from_configuration(trajectory.feed, trajectory.joint_angles, LINK, motion.base_pose)
-    # From each sample the nearest pose of the motion, in time's order: poses are up to 0.05 link lengths apart.
     nearest = [
         int(np.argmin(np.linalg.norm(motion.joints - pose, axis=2).max(axis=1))) for pose in joints[::20]
     ]
@@ -127,7 +131,7 @@ def test_a_smaller_deviation_stays_closer_and_takes_longer(motion: Motion) -> No
 @settings(max_examples=5, deadline=None)
 @given(factor=st.floats(0.3, 4.0))
 def test_time_runs_as_fast_as_the_clock(motion: Motion, factor: float) -> None:
-    """With all speeds times f, accelerations times f^2 and samples f times as many, time runs f times as fast."""
+    """Speeds times f, accelerations times f^2, f times as many samples: all in a time divided by f."""
     faster = TrajectoryLimits(
         joint_speed=factor * LIMITS.joint_speed,
         joint_acceleration=factor**2 * LIMITS.joint_acceleration,
@@ -149,6 +153,17 @@ def test_joints_in_the_feeder_are_straight(trajectory: Trajectory) -> None:
     assert np.abs(driven[:, 1:][past < 0.0]).max() <= 1e-15
 
 
+def test_a_joint_that_is_released_just_before_the_end_is_straight_till_then() -> None:
+    feed = np.linspace(0.0, 1.03, 52)
+    angles = np.zeros((52, 3))
+    angles[:, 2] = 0.02 * np.clip(feed - 1.0, 0.0, None)
+    trajectory = time_parametrise(Motion.from_configurations(100.0 * feed, 0.0 + angles, 100.0, [0, 0, 0]))
+    times = np.linspace(0.0, trajectory.duration, 20 * trajectory.n_points)
+    driven = cubic(trajectory)(times)
+    assert driven[-1, 3] == pytest.approx(angles[-1, 2])
+    assert np.abs(driven[:, 3][driven[:, 0] < 100.0]).max() <= 1e-9
+
+
 def test_what_is_exported_is_valid_at_twice_as_many_moments(trajectory: Trajectory) -> None:
     assert check_trajectory(trajectory, MAZE, limits=LIMITS).valid
     times = np.linspace(0.0, trajectory.duration, 2 * trajectory.n_points - 1)
@@ -165,6 +180,34 @@ def test_what_is_exported_is_valid_at_twice_as_many_moments(trajectory: Trajecto
         joint_accelerations=acceleration[:, 1:],
     )
     assert check_trajectory(finer, MAZE, limits=LIMITS).valid
+
+
+def test_a_motion_that_bends_joints_at_the_base_at_once_is_followed_too() -> None:
+    maze, arm = Maze.load("fig19"), ArmSpec(link_length=LINK)
+    motion = plan(maze, arm, planner="beam").motion
+    assert motion is not None
+    trajectory, report = safe_trajectory(motion, maze, arm)
+    assert report.valid
+    assert max(largest_shares(trajectory, TrajectoryLimits()).values()) <= 1.001
+
+
+def test_a_motion_that_draws_the_arm_back_is_followed_too(motion: Motion) -> None:
+    order = np.concatenate([np.arange(200), np.arange(198, 100, -1), np.arange(101, motion.n_poses)])
+    back = Motion.from_configurations(motion.feed[order], motion.joint_angles[order], LINK, MAZE.base_pose)
+    trajectory, report = safe_trajectory(back, MAZE)
+    assert report.valid
+    assert trajectory.duration > fastest_duration(back) > fastest_duration(motion)
+    assert trajectory.feed_velocity.min() < -0.5 * LINK * 0.9
+
+
+def test_a_refusal_says_where_and_what_helps(motion: Motion, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(checking, "DEVIATIONS", (900.0,))  # paths that cut the corner
+    monkeypatch.setattr(rounding, "SPACING", 2.0)
+    sentence = r"^No trajectory at 50 samples .* Link \d+.* s\. Try a larger --rate"
+    with pytest.raises(ExportRefused, match=sentence) as refusal:
+        safe_trajectory(motion, MAZE)
+    assert refusal.value.report is not None
+    assert not refusal.value.report.valid
 
 
 def test_a_forged_collision_is_refused_with_its_time(trajectory: Trajectory) -> None:
@@ -244,7 +287,7 @@ def test_messages_have_the_fields_of_the_message_definition(
 
 
 def joint_places(robot: Xml.Element, positions: dict[str, float]) -> dict[str, np.ndarray]:
-    """Forward kinematics of a URDF: where the frame of each link is."""
+    """Compute where the frame of each link of a URDF is (forward kinematics)."""
     frames = {"maze": np.eye(4)}
     joints = robot.findall("joint")
     while joints:
@@ -290,16 +333,53 @@ def test_the_urdf_puts_the_joints_where_the_motion_has_them(motion: Motion, traj
 
 @pytest.mark.parametrize("radius", [0.0, 8.0])
 def test_the_links_of_the_urdf_can_exist(motion: Motion, radius: float) -> None:
-    # The walls of this maze are far from the arm of the sweep, so thicker links are valid or refused as such.
     arm = ArmSpec(link_length=LINK, link_radius=radius)
-    try:
-        text = export_bytes(motion, MAZE, arm, "urdf", metres_per_unit=0.001)
-    except ExportRefused:
-        pytest.skip("too thick for this motion")
+    text = export_bytes(motion, MAZE, arm, "urdf", metres_per_unit=0.001)
     for link in Xml.fromstring(text).iter("inertial"):
         assert float(link.find("mass").get("value")) > 0.0
         moments = sorted(float(link.find("inertia").get(key)) for key in ("ixx", "iyy", "izz"))
         assert 0.0 < moments[2] <= moments[0] + moments[1]
+
+
+@pytest.fixture(scope="module")
+def motion_in_space() -> SpatialMotion:
+    """Return an arm of three links that is pushed out of the feeder and bends both ways."""
+    feed = np.linspace(0.0, 2.5, 126)
+    past = np.clip(feed[:, None] - np.array([3.0, 2.0, 1.0]), 0.0, None)
+    angles = np.stack([0.6 * past**2, -0.4 * past**2], axis=2)
+    return SpatialMotion.from_configurations(50.0 * feed, angles, 50.0, [1.0, 2.0, 3.0, 0.6, 0.0, 0.8])
+
+
+def test_universal_joints_hold_the_poses_of_a_motion_in_space(motion_in_space: SpatialMotion) -> None:
+    joints = 50.0 * kinematics_of(motion_in_space).joints(configurations(motion_in_space))
+    assert joints == pytest.approx(motion_in_space.joints, abs=1e-9)
+
+
+def test_a_motion_in_space_gets_its_time_within_limits(motion_in_space: SpatialMotion) -> None:
+    trajectory = time_parametrise(motion_in_space)
+    assert trajectory.joint_angles.shape[1:] == (3, 2)
+    assert trajectory.joint_names[:3] == ("feed", "joint_0_yaw", "joint_0_pitch")
+    assert 0.9 < max(largest_shares(trajectory, TrajectoryLimits()).values()) <= 1.001
+    assert trajectory.deviation <= 1e-3 * 50.0
+    assert not trajectory.joint_angles[:, 0].any()  # it never leaves the feeder
+
+
+def test_the_urdf_in_space_puts_the_joints_where_the_motion_has_them(motion_in_space: SpatialMotion) -> None:
+    moved, arm = motion_in_space, ArmSpec(link_length=50.0)
+    robot = Xml.fromstring(urdf_bytes(moved, arm, TrajectoryLimits(), 0.01, "room"))
+    values = configurations(moved)[-1] * np.array([0.5, *[1.0] * 6])
+    names = time_parametrise(moved).joint_names
+    places = joint_places(robot, dict(zip(names, values, strict=True)))
+    for joint in range(3):
+        assert places[f"link_{joint}"] == pytest.approx(0.01 * moved.joints[-1, joint], abs=1e-9)
+    assert places["tip"] == pytest.approx(0.01 * moved.joints[-1, -1], abs=1e-9)
+
+
+def test_what_does_not_fit_together_is_refused_in_a_sentence(motion_in_space: SpatialMotion) -> None:
+    with pytest.raises(InputError, match=r"Expected one of csv, .* for a motion in space, got 'gif'"):
+        export(motion_in_space, MAZE, format="gif")
+    with pytest.raises(InputError, match="Expected a motion in the plane with a maze"):
+        export(motion_in_space, MAZE)
 
 
 def test_units_with_a_length_are_known_and_others_asked_for() -> None:

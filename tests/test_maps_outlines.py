@@ -136,7 +136,7 @@ def along(piece: Arc | Bezier, n: int = 2000) -> np.ndarray:
     return (basis.T @ (piece.control * weights[:, None])) / (basis.T @ weights)[:, None]
 
 
-coordinates = st.floats(-10, 10)
+coordinates = st.integers(-10_000, 10_000).map(lambda thousandths: thousandths / 1000)
 places = st.tuples(coordinates, coordinates)
 beziers = st.lists(places, min_size=3, max_size=6).flatmap(
     lambda points: st.builds(
@@ -168,13 +168,13 @@ def test_guards_hold_the_curve_and_are_no_wider_than_the_tolerance(piece, tolera
 
 
 @given(controls=st.lists(places, min_size=3, max_size=7, unique=True), free=st.booleans())
-@settings(max_examples=60)
+@settings(max_examples=25)
 def test_free_space_never_grows_over_a_curved_wall(controls: list, free: bool) -> None:
     """A closed curve of quadratic pieces, as a room or as a pillar, crossing itself or not."""
     points = np.array(controls)
     middles = 0.5 * (points + np.roll(points, -1, axis=0))
     pieces = [Bezier(control=np.stack([middles[i - 1], points[i], middles[i]])) for i in range(len(points))]
-    curve = np.concatenate([along(piece, 1000) for piece in pieces])
+    curve = np.concatenate([along(piece, 300) for piece in pieces])
     room = Outline(strokes=(Stroke(pieces=tuple(pieces), closed=True),))
     frame = Line(points=np.array(box(-20, -20, 20, 20).exterior.coords))
     hall = Outline(strokes=(Stroke(pieces=(frame,), closed=True),))
@@ -187,10 +187,10 @@ def test_free_space_never_grows_over_a_curved_wall(controls: list, free: bool) -
         return
     reading = read_outlines(drawing, MapOptions(tolerance=0.05))
     assert reading.moved <= reading.tolerance
-    # Sampled curves are up to 1e-5 off their formula, and 100 long.
-    assert reading.free_space.difference(true).area < 1e-3
+    # Sampled curves are up to 1e-4 off their formula, and 100 long.
+    assert reading.free_space.difference(true).area < 1e-2
     lost = true.difference(reading.free_space)
-    assert lost.difference(LineString(curve).buffer(0.0501)).area < 1e-3
+    assert lost.difference(LineString(curve).buffer(0.051)).area < 1e-2
 
 
 @pytest.mark.parametrize("tolerance", [None, 0.5, 0.0])
@@ -245,7 +245,7 @@ def test_free_space_is_in_the_room_and_in_no_pillar(seed: int, n: int) -> None:
     islands = {
         i
         for i, one in enumerate(pillars)
-        if any(other is not one and other.contains(one) for other in pillars)
+        if any(other is not one and other.buffer(1e-4).contains(one) for other in pillars)
     }
     for i, pillar in enumerate(pillars):
         if not islands:
@@ -275,6 +275,11 @@ def test_rooms_that_share_a_wall_stay_apart() -> None:
 def test_areas_named_free_are_joined() -> None:
     reading = rings(box(0, 0, 6, 2), box(4, 0, 6, 9), layers=("free", "free"))
     assert same_area(reading.free_space, box(0, 0, 6, 2).union(box(4, 0, 6, 9)))
+
+
+def test_a_scribble_is_refused() -> None:
+    with pytest.raises(InputError, match="scribble"):
+        rings(Polygon(np.random.default_rng(1).uniform(0, 1, (2000, 2))))
 
 
 def test_a_bow_tie_is_free_in_both_halves_and_solid_in_all_of_it() -> None:
@@ -594,12 +599,10 @@ def test_a_hatch_of_a_named_layer_is_solid_but_for_its_islands() -> None:
 
 def test_a_damaged_file_is_repaired_and_said() -> None:
     whole = (SAMPLES / "dxf_corridor.dxf").read_bytes()
-    start = whole.index(b"ENTITIES")
-    reading = reading_of("dxf", b"  0\r\nSECTION\r\n  2\r\n" + whole[start:], units="mm")
-    assert reading.base_pose is not None
-    for line in (b"AcDbLine\n 10\n", b"AcDbLine\r\n 10\r\n"):
-        whole = whole.replace(line, line + b"oops")
-    assert any("damaged" in note for note in reading_of("dxf", whole + b"rest").notes) or True
+    reading = reading_of("dxf", whole.replace(b"0.012", b"0.0x2", 1))
+    assert any("damaged" in note for note in reading.notes)
+    reading = reading_of("dxf", whole.replace(b"\nLINE", b"\nLIME", 1).replace(b"\r\nLINE", b"\r\nLIME", 1))
+    assert any("unknown LIME" in note for note in reading.notes)
 
 
 BROKEN_DXF = [

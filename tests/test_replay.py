@@ -2,22 +2,16 @@
 
 import base64
 import builtins
-import contextlib
 import dataclasses
-import fcntl
 import html
 import json
-import os
 import re
-import select
-import shutil
-import signal
 import time
 import zlib
-from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import ERRORS, PATIENCE, PHONE, Page
 
 from hrsnake_env.appearance import COLOURS
 from hrsnake_env.arm import ArmSpec, configuration_from_joints, joints_from_configuration
@@ -259,162 +253,6 @@ def test_without_ipython_one_sentence_says_what_to_install(monkeypatch):
 
 # What a browser makes of it
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
-PATIENCE = 30.0  # s: for anything a browser is asked for
-
-
-class Browser:
-    """Drive a headless Chromium through its debugging pipe: file descriptors 3 and 4, JSON, ended by NUL."""
-
-    def __init__(self, command, folder):
-        ours_in, theirs_out = os.pipe()
-        theirs_in, ours_out = os.pipe()
-        # Above 4, so that neither is written over while they are put in place.
-        given = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10) for end in (theirs_in, theirs_out)]
-        silent = [(os.POSIX_SPAWN_OPEN, number, os.devnull, os.O_RDWR, 0) for number in (0, 1, 2)]
-        placed = [(os.POSIX_SPAWN_DUP2, end, number) for number, end in enumerate(given, start=3)]
-        settings = [f"--user-data-dir={folder}", "--remote-debugging-pipe", "--no-first-run"]
-        # CI has no graphics, little shared memory, and is root, for whom there is no sandbox.
-        settings += ["--headless=new", "--disable-gpu", "--disable-dev-shm-usage", "--no-sandbox"]
-        self._process = os.posix_spawn(
-            command, [command, *settings, "about:blank"], os.environ, file_actions=[*silent, *placed]
-        )
-        for end in (theirs_in, theirs_out, *given):
-            os.close(end)
-        self._in, self._out = ours_in, ours_out
-        self._rest, self._number, self.events = b"", 0, []
-
-    def close(self):
-        """End the browser."""
-        with contextlib.suppress(OSError, AssertionError):
-            self.call("Browser.close")
-        end = time.monotonic() + 10.0
-        while os.waitpid(self._process, os.WNOHANG) == (0, 0):
-            if time.monotonic() > end:
-                os.kill(self._process, signal.SIGKILL)
-            time.sleep(0.02)
-        os.close(self._in)
-        os.close(self._out)
-
-    def call(self, method, session=None, **parameters):
-        """Call a method of the protocol, and return its result."""
-        self._number += 1
-        message = {"id": self._number, "method": method, "params": parameters}
-        if session is not None:
-            message["sessionId"] = session
-        os.write(self._out, json.dumps(message).encode() + b"\0")
-        while True:
-            answer = self._read()
-            if answer.get("id") == self._number:
-                assert "error" not in answer, f"{method}: {answer['error']}"
-                return answer["result"]
-            self.events.append(answer)
-
-    def _read(self):
-        while b"\0" not in self._rest:
-            ready, _, _ = select.select([self._in], [], [], PATIENCE)
-            assert ready, "the browser does not answer"
-            part = os.read(self._in, 1 << 20)
-            assert part, "the browser has ended"
-            self._rest += part
-        message, _, self._rest = self._rest.partition(b"\0")
-        return json.loads(message)
-
-
-class Page:
-    """Hold one page of the browser, and what went wrong on it."""
-
-    def __init__(self, browser, url, width, height, dark=False, mobile=False):
-        self.browser = browser
-        self._target = browser.call("Target.createTarget", url="about:blank")["targetId"]
-        attached = browser.call("Target.attachToTarget", targetId=self._target, flatten=True)
-        self._session = attached["sessionId"]
-        for domain in ("Runtime", "Network", "Page", "Log"):
-            self.call(f"{domain}.enable")
-        size = {"width": width, "height": height, "deviceScaleFactor": 2 if mobile else 1, "mobile": mobile}
-        self.call("Emulation.setDeviceMetricsOverride", **size)
-        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
-        self.call("Emulation.setEmulatedMedia", features=[scheme])
-        if mobile:
-            self.call("Emulation.setTouchEmulationEnabled", enabled=True)
-        self.call("Page.navigate", url=url)
-        self.wait("document.documentElement?.dataset.ready === '1'")
-
-    def call(self, method, **parameters):
-        """Call a method of the protocol on this page."""
-        return self.browser.call(method, self._session, **parameters)
-
-    def evaluate(self, code):
-        """Return the value of an expression of JavaScript."""
-        answer = self.call("Runtime.evaluate", expression=code, returnByValue=True, awaitPromise=True)
-        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
-        return answer["result"].get("value")
-
-    def wait(self, condition):
-        """Wait until an expression is true."""
-        end = time.monotonic() + PATIENCE
-        while not self.evaluate(condition):
-            assert time.monotonic() < end, f"never came: {condition}; {self.evaluate(ERRORS)}"
-            time.sleep(0.02)
-
-    def frames(self, number=2):
-        """Wait until the page has drawn."""
-        for _ in range(number):
-            self.evaluate("new Promise((done) => requestAnimationFrame(() => done(1)))")
-
-    def pose(self):
-        """Return the pose that is shown."""
-        self.frames()
-        return int(self.evaluate("document.documentElement.dataset.pose"))
-
-    def key(self, key, text="", **settings):
-        """Press a key."""
-        for kind in ("keyDown", "keyUp"):
-            given = {"text": text} if text and kind == "keyDown" else {}
-            self.call("Input.dispatchKeyEvent", type=kind, key=key, **given, **settings)
-
-    def mouse(self, kind, x, y, **settings):
-        """Move the mouse, its wheel or a button."""
-        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **settings)
-
-    def click(self, x, y, count=1):
-        """Click once, or twice."""
-        for number in range(1, count + 1):
-            self.mouse("mousePressed", x, y, button="left", clickCount=number)
-            self.mouse("mouseReleased", x, y, button="left", clickCount=number)
-
-    def save_picture(self, path):
-        """Write what is seen (.png)."""
-        data = self.call("Page.captureScreenshot", format="png")["data"]
-        Path(path).write_bytes(base64.b64decode(data))
-
-    def close(self):
-        """Close the page, after a look at whether it has complained or asked for more than itself."""
-        assert self.evaluate(ERRORS) == ""
-        mine = [event for event in self.browser.events if event.get("sessionId") == self._session]
-        bad = [event for event in mine if event["method"] in ("Runtime.exceptionThrown", "Log.entryAdded")]
-        assert bad == []
-        urls = [event["params"]["request"]["url"] for event in mine if "requestWillBeSent" in event["method"]]
-        assert [url for url in urls if not url.startswith(("file:", "data:"))] == [] and len(urls) <= 1
-        self.browser.call("Target.closeTarget", targetId=self._target)
-
-
-ERRORS = "document.documentElement.dataset.errors"
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    """Return a headless Chromium."""
-    found = [path for path in map(shutil.which, BROWSERS) if path]
-    if not found:
-        reason = f"needs a browser: none of {', '.join(BROWSERS)} is on the PATH"
-        if os.environ.get("HRSNAKE_REQUIRE_BROWSER"):
-            pytest.fail(reason)
-        pytest.skip(reason)
-    chromium = Browser(found[0], tmp_path_factory.mktemp("browser"))
-    yield chromium
-    chromium.close()
-
 
 @pytest.fixture
 def opened(browser, tmp_path):
@@ -446,7 +284,7 @@ def test_the_browser_shows_the_joints_of_the_episode(opened, episode, share):
     np.testing.assert_allclose(np.radians(shown["angles"]), angles, atol=4 * QUANTUM)
     assert {k for k, kind in enumerate(shown["touching"]) if kind == 1} == episode.pinched(pose)
     assert len(shown["contacts"]) == len(episode.contacts[pose])
-    tip = page.evaluate("document.querySelector('.tip-place').textContent").replace("\u2212", "-")
+    tip = page.evaluate("document.querySelector('.hp-tip-place').textContent").replace("\u2212", "-")
     assert re.findall(r"-?\d+", tip) == [f"{value:.0f}" for value in episode.joints[pose, -1]]
 
 
@@ -474,12 +312,12 @@ def test_of_two_runs_the_shorter_one_waits_at_its_end(opened):
     page = opened(waving(), waving(n_poses=25, title="short"), fragment="pose=30&play=0&probe")
     shown = json.loads(page.evaluate("document.documentElement.dataset.joints"))
     assert [trace["pose"] for trace in shown] == [30, 24]
-    assert page.evaluate("Array.from(document.querySelectorAll('h1'), (h) => h.textContent)") == [
+    assert page.evaluate("Array.from(document.querySelectorAll('.hp-head h2'), (h) => h.textContent)") == [
         "waving",
         "short",
     ]
     left, right = page.evaluate(
-        "Array.from(document.querySelectorAll('.stage'), (s) => s.getBoundingClientRect().left)"
+        "Array.from(document.querySelectorAll('.hp-stage'), (s) => s.getBoundingClientRect().left)"
     )
     assert right > left + 400
 
@@ -499,7 +337,7 @@ def test_keys_step_play_and_go_to_the_ends(opened):
     assert poses == [11, 21, 20, 0, 39]
     page.key(" ", text=" ")
     assert page.evaluate("document.documentElement.dataset.playing") == "1"
-    assert page.evaluate("document.getElementById('play').ariaLabel") == "Pause"
+    assert page.evaluate("document.querySelector('.hp-play').ariaLabel") == "Pause"
     page.key(" ", text=" ")
     assert page.evaluate("document.documentElement.dataset.playing") == "0"
 
@@ -507,11 +345,12 @@ def test_keys_step_play_and_go_to_the_ends(opened):
 def test_the_slider_scrubs_and_says_where_it_is(opened):
     page = opened(waving())
     page.evaluate(
-        "const s = document.getElementById('slider'); s.value = 33; s.dispatchEvent(new Event('input'))"
+        "const s = document.querySelector('.hp-slider'); s.value = 33; s.dispatchEvent(new Event('input'))"
     )
     assert page.pose() == 33
     assert (
-        page.evaluate("document.getElementById('slider').getAttribute('aria-valuetext')") == "pose 33 of 39"
+        page.evaluate("document.querySelector('.hp-slider').getAttribute('aria-valuetext')")
+        == "pose 33 of 39"
     )
 
 
@@ -537,57 +376,54 @@ def test_every_control_has_a_name(opened):
 def test_a_contact_that_is_pointed_at_says_how_deep(opened, pose, words):
     page = opened(waving(), fragment=f"pose={pose}&play=0")
     place = page.evaluate(
-        "(() => { const v = views[0], c = v.trace.contactsOf[v.pose][0];"
+        "(() => { const v = player.views[0], c = v.trace.contactsOf[v.pose][0];"
         " const b = v.canvas.getBoundingClientRect();"
         " const [x, y] = v.screen(c.x, c.y); return [b.left + x, b.top + y]; })()"
     )
     page.mouse("mouseMoved", *place)
     page.frames()
-    tip = page.evaluate("document.querySelector('.tip:not([hidden])').textContent")
+    tip = page.evaluate("document.querySelector('.hp-tip:not([hidden])').textContent")
     assert all(word in tip for word in words)
 
 
 def test_links_are_coloured_by_what_they_touch(opened):
     page = opened(waving(), fragment="pose=8&play=0")
-    colours = page.evaluate("[0, 3].map((link) => linkColour(views[0].trace, 8, link))")
+    colours = page.evaluate("[0, 3].map((link) => player.views[0].linkColour(8, link))")
     assert colours == ["rgb(31,95,174)", COLOURS["collision"]]  # 80 px from the walls, and in one
-    assert page.evaluate("linkColour(views[0].trace, 7, 3)") == COLOURS["pinch"]
+    assert page.evaluate("player.views[0].linkColour(7, 3)") == COLOURS["pinch"]
 
 
 def test_a_click_on_a_plot_goes_to_that_pose(opened):
     page = opened(waving())
     x, y, width, height = page.evaluate(
-        "(() => { const b = document.querySelector('canvas.angles').getBoundingClientRect();"
+        "(() => { const b = document.querySelector('canvas.hp-angles').getBoundingClientRect();"
         " return [b.left, b.top, b.width, b.height]; })()"
     )
     page.click(x + 40 + (width - 46) / 2, y + height / 2)
     assert page.pose() in (19, 20)
     page.mouse("mouseMoved", x + 40 + (width - 46) / 2, y + height / 2)
     page.frames()
-    assert page.evaluate("document.querySelector('.angle-note').textContent").startswith("link ")
+    assert page.evaluate("document.querySelector('.hp-angle-note').textContent").startswith("link ")
 
 
 def test_wheel_and_drag_look_closer_and_a_double_click_fits(opened):
     page = opened(waving(), waving(title="same maze"))
     x, y = page.evaluate(
-        "(() => { const b = views[0].canvas.getBoundingClientRect();"
+        "(() => { const b = player.views[0].canvas.getBoundingClientRect();"
         " return [b.left + b.width / 2 + 9, b.top + b.height / 2]; })()"
     )
     page.mouse("mouseWheel", x, y, deltaX=0, deltaY=-400)
-    page.wait("views[0].view.zoom > 1.5")
-    assert page.evaluate("views[0].view === views[1].view")  # one maze, one view
-    before = page.evaluate("views[0].view.x")
+    page.wait("player.views[0].view.zoom > 1.5")
+    assert page.evaluate("player.views[0].view === player.views[1].view")  # one maze, one view
+    before = page.evaluate("player.views[0].view.x")
     page.mouse("mousePressed", x, y, button="left", clickCount=1)
     page.mouse("mouseMoved", x - 30, y, button="left")
     page.mouse("mouseReleased", x - 30, y, button="left", clickCount=1)
     page.frames()
-    assert page.evaluate("views[0].view.x") > before
+    assert page.evaluate("player.views[0].view.x") > before
     page.click(x, y, count=2)
     page.frames()
-    assert page.evaluate("views[0].view.zoom") == 1
-
-
-PHONE = {"width": 360, "height": 740, "mobile": True}
+    assert page.evaluate("player.views[0].view.zoom") == 1
 
 
 @pytest.mark.parametrize("dark", [False, True])
@@ -597,19 +433,19 @@ def test_a_phone_shows_all_without_scrolling_sideways(opened, number, dark):
     page = opened(*traces, dark=dark, **PHONE)
     page.frames()
     assert page.evaluate("[document.documentElement.scrollWidth, innerWidth]") == [360, 360]
-    bottom = page.evaluate("document.querySelector('footer').getBoundingClientRect().bottom")
+    bottom = page.evaluate("document.querySelector('.hp-controls').getBoundingClientRect().bottom")
     assert bottom == pytest.approx(740, abs=1)
     assert page.evaluate(
-        "Array.from(document.querySelectorAll('footer button, footer select, footer input'))"
+        "Array.from(document.querySelectorAll('.hp-controls :is(button, select, input)'))"
         ".every((b) => b.getBoundingClientRect().right <= 360)"
     )
-    assert page.evaluate("style.free") == ("#12161b" if dark else COLOURS["free"])
+    assert page.evaluate("player.style.free") == ("#12161b" if dark else COLOURS["free"])
 
 
 def test_two_fingers_zoom(opened):
     page = opened(waving(), **PHONE)
     x, y = page.evaluate(
-        "(() => { const b = views[0].canvas.getBoundingClientRect();"
+        "(() => { const b = player.views[0].canvas.getBoundingClientRect();"
         " return [b.left + b.width / 2, b.top + b.height / 2]; })()"
     )
     for kind, apart in (("touchStart", 20), ("touchMove", 30), ("touchMove", 60)):
@@ -617,12 +453,12 @@ def test_two_fingers_zoom(opened):
         page.call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
     page.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
     page.frames()
-    assert page.evaluate("views[0].view.zoom") > 2
+    assert page.evaluate("player.views[0].view.zoom") > 2
 
 
 def test_a_run_without_clearances_and_contacts_is_shown_too(opened):
     page = opened(waving(clearances=None, contacts=None, summary=()), fragment="pose=5&play=0")
-    assert page.evaluate("document.querySelector('canvas.clearances').getBoundingClientRect().height") == 0
+    assert page.evaluate("document.querySelector('canvas.hp-clearances').getBoundingClientRect().height") == 0
 
 
 def test_a_run_of_one_pose_of_one_link_is_shown_too(opened):
@@ -633,8 +469,8 @@ def test_a_run_of_one_pose_of_one_link_is_shown_too(opened):
 
 def test_in_the_browser_too_names_are_only_text(opened):
     page = opened(waving(title=EVIL, maze=corridor(EVIL)))
-    assert page.evaluate("document.querySelector('h1').textContent") == EVIL
-    assert page.evaluate("document.querySelectorAll('h1 *').length") == 0
+    assert page.evaluate("document.querySelector('.hp-title').textContent") == EVIL
+    assert page.evaluate("document.querySelectorAll(':is(h1, h2.hp-title) *').length") == 0
 
 
 def test_the_frame_of_a_notebook_runs_it(browser, tmp_path):
@@ -682,10 +518,10 @@ def test_a_page_that_fails_says_so(browser, tmp_path):
 def test_something_is_drawn(opened, episode, settings, tmp_path):
     page = opened(episode.trace(fig19()), fragment="pose=300&play=0", **settings)
     shown = page.evaluate(
-        "(() => { const c = views[0].canvas, seen = new Set();"
+        "(() => { const c = player.views[0].canvas, seen = new Set();"
         " const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
         " for (let k = 0; k < d.length; k += 4) seen.add((d[k] << 16) | (d[k + 1] << 8) | d[k + 2]);"
-        " const number = (name) => parseInt(style[name].slice(1), 16);"
+        " const number = (name) => parseInt(player.style[name].slice(1), 16);"
         " return ['wall', 'free', 'joint', 'card'].map((name) => seen.has(number(name))); })()"
     )
     assert all(shown)

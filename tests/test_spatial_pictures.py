@@ -11,8 +11,9 @@ import zlib
 import numpy as np
 import pytest
 import shapely
+from browser import ERRORS, PATIENCE, PHONE, Page
 from matplotlib.image import imread
-from test_replay import ERRORS, EVIL, PATIENCE, PHONE, Page, browser  # noqa: F401 (a fixture)
+from test_replay import EVIL
 
 from hrsnake_env.appearance import COLOURS
 from hrsnake_env.errors import InputError
@@ -367,7 +368,7 @@ def of_graphics(event):
 
 
 @pytest.fixture
-def opened(browser, tmp_path):  # noqa: F811
+def opened(browser, tmp_path):
     """Return a function that writes a page and opens it."""
     pages = []
 
@@ -564,7 +565,7 @@ def test_a_phone_shows_all_without_scrolling_sideways_and_two_fingers_zoom(opene
     assert background == ([24, 29, 36] if dark else [255, 255, 255])
 
 
-def test_without_webgl_the_page_says_so_and_still_shows_the_numbers(browser, tmp_path):  # noqa: F811
+def test_without_webgl_the_page_says_so_and_still_shows_the_numbers(browser, tmp_path):
     out = tmp_path / "p.html"
     save_page([scene()], out)
     refused = "<script>HTMLCanvasElement.prototype.getContext = ((real) => function (kind, ...more) { "
@@ -592,7 +593,7 @@ def test_graphics_that_are_taken_away_come_back(opened):
     assert page.evaluate(CHANGED) == 0
 
 
-def test_a_page_that_is_broken_says_so(browser, tmp_path):  # noqa: F811
+def test_a_page_that_is_broken_says_so(browser, tmp_path):
     out = tmp_path / "broken.html"
     save_page([scene()], out)
     out.write_text(out.read_text(encoding="utf-8").replace('"nLinks":5', '"nLinks":6'), encoding="utf-8")

@@ -350,6 +350,18 @@ def test_the_deepest_chord_is_that_of_a_search_over_all(seed):
     assert max(depth, 0.0) == pytest.approx(worst, abs=1e-12)
 
 
+def test_a_chord_may_end_at_the_last_sample_itself():
+    points = np.zeros((100, 3))
+    points[:, 0] = np.arange(100.0)  # in whole numbers, so that chords end at samples
+    limited = kernel.Demand(30.0, 1.0, 0.5, 0.1, False)
+    straight = points.copy()
+    kernel.relax(straight, 31, limited, np.empty((0, 2, 3)), 0.0, 3)
+    assert np.array_equal(straight, points)
+    points[60:, 1] = np.arange(40.0)  # a joint there is over its limit
+    kernel.relax(points, 31, limited, np.empty((0, 2, 3)), 0.0, 3)
+    assert np.isfinite(points).all()
+
+
 def test_a_joint_limit_straightens_the_track():
     corner = np.array([[1.0, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, 2.0, 1.0], [3.0, 4.0, 1.0]])
     free = resampled(corner, 1.0 / PER_LINK)

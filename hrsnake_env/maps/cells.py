@@ -15,6 +15,9 @@ __all__ = ["Grid", "IntArray", "Walls", "cross", "grid_of", "is_clear", "listed"
 
 IntArray = NDArray[np.int64]
 
+GAP = 1e-11
+"""In the size of the coordinates. Rounding then never decides whether walls touch."""
+
 MAX_CELLS = 4_000_000
 """Of the grid that finds walls."""
 
@@ -46,6 +49,8 @@ class Grid(NamedTuple):
     x: float
     y: float
     cell: float
+    gap: float
+    """What is nearer than this counts as touching."""
     n_x: int
     n_y: int
     head: IntArray
@@ -68,7 +73,10 @@ def grid_of(walls: Walls) -> Grid:
     n = min(walls.left.sum(), MAX_CELLS // 2)
     cell = max(math.sqrt(wide * high / n), max(wide, high) / n)
     n_x, n_y = int(wide / cell) + 1, int(high / cell) + 1
-    return Grid(x, y, cell, n_x, n_y, np.full(n_x * n_y, -1, dtype=np.int64), np.zeros(1, dtype=np.int64))
+    gap = GAP * np.abs(walls.old).max()
+    return Grid(
+        x, y, cell, gap, n_x, n_y, np.full(n_x * n_y, -1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+    )
 
 
 @numba.njit(cache=True)
@@ -127,8 +135,12 @@ def is_clear(
     b: FloatArray,
     c: FloatArray,
     own: tuple[int, int, int],
+    alone: bool,
 ) -> bool:
-    """Tell whether a triangle is free of walls, other than those that begin at `own`."""
+    """Tell whether a triangle is free of walls, other than those that begin at `own`.
+
+    Walls may begin and end at its corners, unless those shall be `alone`.
+    """
     if cross(b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]) < 0.0:
         b, c = c, b
     for row in range(_row(grid, min(a[1], b[1], c[1])), _row(grid, max(a[1], b[1], c[1])) + 1):
@@ -140,35 +152,44 @@ def is_clear(
                 entry = entries[entry, 2]
                 if walls.after[i] != j or i == own[0] or i == own[1] or i == own[2]:
                     continue
-                if _touches(walls.now[i], walls.now[j], a, b, c):
+                if _touches(walls.now[i], walls.now[j], a, b, c, alone, grid.gap):
                     return False
     return True
 
 
 @numba.njit(cache=True)
-def _goes_in(here: FloatArray, end: FloatArray, following: FloatArray, before: FloatArray) -> bool:
+def _goes_in(
+    here: FloatArray, end: FloatArray, following: FloatArray, before: FloatArray, gap: float
+) -> bool:
     """Tell whether a line from a corner of a triangle goes into it or along it; the triangle may be flat."""
     x, y = end[0] - here[0], end[1] - here[1]
     fx, fy = following[0] - here[0], following[1] - here[1]
     bx, by = before[0] - here[0], before[1] - here[1]
-    if cross(fx, fy, bx, by) == 0.0 and fx * bx + fy * by < 0.0:
-        return True  # the middle of three in a row
-    if cross(fx, fy, x, y) < 0.0 or cross(x, y, bx, by) < 0.0:
+    flat = gap * max(math.hypot(fx, fy), math.hypot(bx, by))
+    if abs(cross(fx, fy, bx, by)) <= flat and fx * bx + fy * by < 0.0:
+        return True  # the middle of three in a row: a wall will pass there
+    length = math.hypot(x, y)
+    if cross(fx, fy, x, y) < -gap * max(length, math.hypot(fx, fy)):
+        return False
+    if cross(x, y, bx, by) < -gap * max(length, math.hypot(bx, by)):
         return False
     return bool(x * fx + y * fy > 0.0 or x * bx + y * by > 0.0)
 
 
 @numba.njit(cache=True)
-def _touches(d: FloatArray, e: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray) -> bool:
+def _touches(
+    d: FloatArray, e: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray, alone: bool, gap: float
+) -> bool:
     """Tell whether the line from d to e touches a triangle (a to b to c turns left).
 
-    A line that begins or ends at a corner does not, unless it goes on into the triangle or along its side.
+    A line that begins or ends at a corner does not, unless it goes on into the triangle or along its side, or
+    the corner shall be alone.
     """
     if (
-        max(d[0], e[0]) < min(a[0], b[0], c[0])
-        or min(d[0], e[0]) > max(a[0], b[0], c[0])
-        or max(d[1], e[1]) < min(a[1], b[1], c[1])
-        or min(d[1], e[1]) > max(a[1], b[1], c[1])
+        max(d[0], e[0]) < min(a[0], b[0], c[0]) - gap
+        or min(d[0], e[0]) > max(a[0], b[0], c[0]) + gap
+        or max(d[1], e[1]) < min(a[1], b[1], c[1]) - gap
+        or min(d[1], e[1]) > max(a[1], b[1], c[1]) + gap
     ):
         return False
     for k in range(3):
@@ -176,13 +197,14 @@ def _touches(d: FloatArray, e: FloatArray, a: FloatArray, b: FloatArray, c: Floa
         for m in range(2):
             start, end = (d, e) if m == 0 else (e, d)
             if start[0] == here[0] and start[1] == here[1]:
-                return _goes_in(here, end, following, before)
+                return alone or _goes_in(here, end, following, before, gap)
     for k in range(3):
         here, following = (a, b) if k == 0 else ((b, c) if k == 1 else (c, a))
         x, y = following[0] - here[0], following[1] - here[1]
+        far = -gap * math.hypot(x, y)
         if (
-            cross(x, y, d[0] - here[0], d[1] - here[1]) < 0.0
-            and cross(x, y, e[0] - here[0], e[1] - here[1]) < 0.0
+            cross(x, y, d[0] - here[0], d[1] - here[1]) < far
+            and cross(x, y, e[0] - here[0], e[1] - here[1]) < far
         ):
             return False
     x, y = e[0] - d[0], e[1] - d[1]
@@ -191,4 +213,5 @@ def _touches(d: FloatArray, e: FloatArray, a: FloatArray, b: FloatArray, c: Floa
         cross(x, y, b[0] - d[0], b[1] - d[1]),
         cross(x, y, c[0] - d[0], c[1] - d[1]),
     )
-    return not (min(sides) > 0.0 or max(sides) < 0.0)
+    far = gap * math.hypot(x, y)
+    return not (min(sides) > far or max(sides) < -far)

@@ -91,7 +91,9 @@ def _document(data: bytes, name: str) -> tuple[Any, list[str]]:
     except Exception:
         raise InputError(f"Expected a DXF drawing in '{name}', got one damaged beyond repair.") from None
     n = len(auditor.fixes) + len(auditor.errors)
-    return document, [f"The file is damaged; it was repaired in {counted(n, 'place')}."]
+    return document, [
+        f"The file is damaged; {counted(n, 'place')} of it repaired, and what could not be read left out."
+    ]
 
 
 class _Reader:
@@ -136,6 +138,9 @@ class _Reader:
         if self.n_entities > MAX_ENTITIES:
             raise InputError(f"Expected at most {MAX_ENTITIES:,} entities in '{self.name}', got more.")
         kind = entity.dxftype()
+        if not entity.dxf.is_supported("layer"):  # a thing that the library does not know
+            self.left[f"unknown {kind}"] += 1
+            return
         own = str(entity.dxf.get("layer", "0"))
         layer = above if own == "0" else own
         if self._is_hidden(entity, own):

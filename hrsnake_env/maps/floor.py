@@ -12,7 +12,7 @@ from shapely.geometry import LineString, MultiPolygon, Polygon
 
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.maps.drawing import counted
-from hrsnake_env.maps.nesting import even_odd, filled, nested, odd, polygons
+from hrsnake_env.maps.nesting import even_odd, filled, nested, odd, polygons, without
 from hrsnake_env.maps.tracing import Ring, Traced
 
 __all__ = ["free_space_of"]
@@ -71,7 +71,7 @@ def _named(things: list[list[Ring]], thick: list[Area], table: dict[str, str], n
         notes.append(f"{counted(n_around, 'outline')} around the free space left out.")
     if n_unnamed:
         notes.append(f"{counted(n_unnamed, 'closed outline')} without a role taken as obstacles.")
-    return shapely.difference(space, shapely.union_all(walls))
+    return without(space, walls)
 
 
 def _floor_plan(
@@ -113,7 +113,7 @@ def _floor_plan(
         notes.append(
             f"{counted(n_cross, 'outline')} crossing larger ones are obstacles: name free what is to join."
         )
-    return shapely.difference(plan.free_space, material)
+    return without(plan.free_space, [material])
 
 
 def _thick_walls(drawn: Traced, thickness: float, table: dict[str, str], notes: list[str]) -> list[Area]:

@@ -151,7 +151,7 @@ def _cut(
     if (
         turn >= 0.0
         and _deviation(walls, foot[a], foot[b], now[a], now[b], limit) <= limit
-        and is_clear(walls, grid, entries, now[a], now[i], now[b], (a, i, i))
+        and is_clear(walls, grid, entries, now[a], now[i], now[b], (a, i, i), False)
     ):
         _remove(walls, i)
         return True, listed(grid, entries, walls, a)
@@ -175,7 +175,7 @@ def _cover(
         gap > limit
         or _deviation(walls, foot[o], t, now[o], x, limit) > limit
         or _deviation(walls, t, foot[r], x, now[r], limit) > limit
-        or not is_clear(walls, grid, entries, now[p], now[q], x, (o, p, q))
+        or not is_clear(walls, grid, entries, now[p], now[q], x, (o, p, q), True)
     ):
         return False, entries
     now[p] = x

@@ -12,8 +12,48 @@ from shapely import STRtree
 from shapely.geometry import MultiPolygon, Polygon
 
 from hrsnake_env.arm import FloatArray
+from hrsnake_env.errors import InputError
 
-__all__ = ["Nesting", "even_odd", "filled", "nested", "odd", "polygons"]
+__all__ = [
+    "MAX_CROSSINGS",
+    "Nesting",
+    "check_crossings",
+    "even_odd",
+    "filled",
+    "nested",
+    "odd",
+    "polygons",
+    "without",
+]
+
+
+MAX_CROSSINGS = 20_000
+"""Of one outline with itself: more of them are a scribble, and take minutes."""
+
+N_PROBES = 500
+
+GRID = 1e-13
+"""Share of the largest coordinate to which points are rounded where plain arithmetic fails."""
+
+
+def check_crossings(points: FloatArray) -> None:
+    """Check that a line does not cross itself too often, as far as some of its sides tell.
+
+    Raises
+    ------
+    InputError
+        If it does.
+    """
+    n = len(points) - 1
+    if n * n < 2 * MAX_CROSSINGS:
+        return
+    sides = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1))
+    probes = sides[:: max(1, n // N_PROBES)]
+    hits = len(STRtree(sides).query(probes, predicate="crosses")[0])
+    if hits * n / len(probes) > 2 * MAX_CROSSINGS:
+        raise InputError(
+            f"Expected outlines that cross themselves at most {MAX_CROSSINGS:,} times, got a scribble."
+        )
 
 
 def polygons(geometry: shapely.Geometry) -> list[Polygon]:
@@ -26,6 +66,20 @@ def polygons(geometry: shapely.Geometry) -> list[Polygon]:
         elif part.geom_type.startswith(("Multi", "Geometry")):
             found += polygons(part)
     return found
+
+
+def without(area: shapely.Geometry, taken: Sequence[shapely.Geometry] | np.ndarray) -> MultiPolygon | Polygon:
+    """Return an area without others.
+
+    Rounding of almost parallel sides makes GEOS return invalid areas now and then; on a grid finer than any
+    wall it does not.
+    """
+    others = shapely.disjoint_subset_union_all(taken)
+    left = shapely.difference(area, others)
+    if left.is_valid:
+        return left
+    grid = GRID * float(np.abs(area.bounds).max())
+    return shapely.difference(shapely.make_valid(area), others, grid_size=grid)
 
 
 def even_odd(rings: Sequence[FloatArray]) -> MultiPolygon | Polygon:
@@ -116,7 +170,7 @@ def nested(rings: Sequence[FloatArray], is_wall: Sequence[bool], gap: float, thi
             for j in obstacles[tree.query(areas[i], predicate="intersects")].tolist()
             if (i, j) not in around
         ]
-        rooms.append(shapely.difference(even_odd([rings[i]]), shapely.union_all(areas[near])))
+        rooms.append(without(even_odd([rings[i]]), areas[near]))
     return Nesting(free_space=_apart(rooms, thickness), free=free, twice=twice, crossing=crossing)
 
 
@@ -159,8 +213,5 @@ def _apart(rooms: list[Polygon | MultiPolygon], thickness: float) -> Polygon | M
             wall = shapely.buffer(shared, 0.5 * thickness, cap_style="flat", join_style="mitre")
             walls.setdefault(i, []).append(wall)
             walls[j].append(wall)
-    parts = [
-        shapely.difference(room, shapely.union_all(walls[i])) if i in walls else room
-        for i, room in enumerate(rooms)
-    ]
+    parts = [without(room, walls[i]) if i in walls else room for i, room in enumerate(rooms)]
     return shapely.union_all(parts)

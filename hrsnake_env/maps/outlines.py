@@ -28,7 +28,7 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.maps.drawing import Drawing, Outline, factor, scaled, sound
 from hrsnake_env.maps.floor import free_space_of
 from hrsnake_env.maps.marks import base_of, goal_of, widest_heading
-from hrsnake_env.maps.nesting import polygons
+from hrsnake_env.maps.nesting import polygons, without
 from hrsnake_env.maps.reading import MapOptions, MapReading
 from hrsnake_env.maps.roles import roles_of
 from hrsnake_env.maps.simplify import simplified_inward
@@ -131,13 +131,14 @@ def _looking(heading: float | None) -> str:
     )
 
 
-def _guarded(free: Area, guards: list[np.ndarray]) -> Area:
+def _guarded(free: Area, guards: list[shapely.Geometry]) -> Area:
     """Return the free space without what chords leave out of curves."""
-    every = np.concatenate([*guards, np.empty(0, dtype=object)])
+    every = np.array(guards, dtype=object)
     if free.is_empty or not len(every):
         return free
     shapely.prepare(free)
-    return shapely.difference(free, shapely.union_all(every[shapely.intersects(free, every)]))
+    near = every[shapely.intersects(free, every)]
+    return without(free, near)
 
 
 def _without_slivers(free: Area, size: float) -> Area:

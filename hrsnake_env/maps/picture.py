@@ -25,7 +25,7 @@ __all__ = ["draw_reading"]
 PARTS = ("#ffffff", "#cfe3f7", "#fde4b8", "#d3eed9", "#ead9f2", "#f9d5d5")
 """Of the parts of the free space that are not joined: the largest first; the last is for all others."""
 
-SIDE, LEAST, LINE = 7.0, 2.5, 0.19
+SIDE, LEAST, LINE = 7.0, 2.5, 0.165
 """The longer side of the map, the least of the shorter one, and a line of text, in inches."""
 
 MARGIN = 0.9

@@ -69,7 +69,8 @@ def read_svg(name: str, files: MapFiles, options: MapOptions) -> MapReading:
         root.attrib.pop(key, None)  # the page's size is ours: the library's mm are 1 in 2 million off
     try:
         picture = SVG.parse(io.BytesIO(ElementTree.tostring(root)), reify=False)
-        outlines = list(_outlines(picture, to_page, height))
+        with np.errstate(all="ignore"):  # what is not finite is left out later, and said
+            outlines = list(_outlines(picture, to_page, height))
     except (ValueError, TypeError, IndexError, KeyError, AttributeError, ZeroDivisionError, OverflowError):
         raise InputError(f"Expected shapes that can be read in '{name}', got broken ones.") from None
     except RecursionError:

@@ -15,6 +15,7 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.maps.drawing import Outline, Stroke, counted
 from hrsnake_env.maps.flatten import MAX_POINTS, Trace, flattened
 from hrsnake_env.maps.joining import joined
+from hrsnake_env.maps.nesting import check_crossings
 
 __all__ = ["OpenLine", "Ring", "Traced", "traced"]
 
@@ -56,8 +57,8 @@ class Traced:
     ----------
     rings, open_lines
         What is closed and what is not.
-    guards : list of arrays of Polygon
-        What chords leave out of curves, see `flatten.Trace`.
+    guards : list of geometries
+        What chords leave out of each curve, see `flatten.Trace`.
     deviation : float
         How far guards reach from their chords.
     notes : list of str
@@ -65,13 +66,14 @@ class Traced:
 
     rings: list[Ring] = field(default_factory=list)
     open_lines: list[OpenLine] = field(default_factory=list)
-    guards: list[np.ndarray] = field(default_factory=list)
+    guards: list[shapely.Geometry] = field(default_factory=list)
     deviation: float = 0.0
     notes: list[str] = field(default_factory=list)
 
     def take(self, trace: Trace) -> None:
         """Take over what is known of a trace's curves."""
-        self.guards.append(trace.guards)
+        if len(trace.guards):  # one union per curve is far faster than one of all
+            self.guards.append(shapely.disjoint_subset_union_all(trace.guards))
         self.deviation = max(self.deviation, trace.deviation)
 
 
@@ -115,6 +117,7 @@ def traced(
             if np.ptp(trace.points, axis=0).max() <= 0.0:
                 left["place or shape of no size"] += 1
                 continue
+            check_crossings(trace.points)
             found.take(trace)
             if _encloses(stroke, trace.points, gap):
                 found.rings.append(Ring(points=trace.points, role=role, key=key, outline=i))

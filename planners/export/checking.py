@@ -1,10 +1,10 @@
 """Check trajectories as motions are checked: independently, and as a controller drives them.
 
 Between samples a controller goes along cubics through positions and velocities. So many poses are taken
-from these that what changes linearly between them is no farther off than `CHORD`; the exact checker
-(`planners.validation`) then decides on these poses and on everything between them. A motion may get as deep as
-the pinch tolerance between its poses and not at them; of a trajectory no moment is more of a pose than any
-other, so it may get that deep at any. All other rules are the motion's.
+from these that what changes linearly between them is no farther off than `CHORD`. The exact checker
+(`planners.validation`) then decides on these poses and on everything between them. A motion may get as deep
+as the pinch tolerance between its poses and not at them; of a trajectory no moment is more of a pose than
+any other, so it may get that deep at any. All other rules are the motion's.
 """
 
 from __future__ import annotations
@@ -44,6 +44,10 @@ LIMIT_TOLERANCE = 1e-3
 
 CHORD = 0.02 * PINCH_TOLERANCE
 """How far poses between those that are checked may be from where the checker has them, in link lengths."""
+
+HOPELESS = 8.0
+"""How many times farther off than the rounded path a trajectory is whose samples are too far apart: a closer
+path is no help then."""
 
 STEP_SHARE = 0.8
 """Of the largest step between two poses: what is taken from the cubics stays below."""
@@ -305,6 +309,8 @@ def safe_trajectory(
         report = check_trajectory(trajectory, maze, arm, limits, progress)
         if report.valid:
             return trajectory, report
+        if trajectory.deviation > HOPELESS * deviation * motion.link_length:
+            break
     raise ExportRefused(
         f"No trajectory at {rate:g} samples per second keeps to this motion: {report.faults[0].message} "
         f"Try a larger --rate, or lower speeds and accelerations.",

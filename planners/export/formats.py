@@ -263,7 +263,7 @@ def export(
     ExportRefused
         If the motion is not valid, or no trajectory near it is.
     """
-    entry = EXPORTS[format_for("", format)]
+    entry = EXPORTS[format_for("", str(format))]
     if not entry.in_space and not isinstance(motion, Motion):
         possible = ", ".join(name for name, other in EXPORTS.items() if other.in_space)
         raise InputError(f"Expected one of {possible} for a motion in space, got '{format}'.")

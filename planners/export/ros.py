@@ -2,7 +2,8 @@
 
 ``ros2 topic pub /TOPIC trajectory_msgs/msg/JointTrajectory "$(cat FILE)"`` reads both texts. It reads
 YAML 1.1, of which the JSON written here is a part: numbers have a point before an exponent, for without it
-they would be strings there.
+they would be strings there. Linux passes at most 128 KiB in one argument: longer messages have to be read
+from the file, or sampled at a lower rate.
 """
 
 from __future__ import annotations

@@ -37,6 +37,12 @@ SAMPLES = 3
 
 DEGREE = 3
 
+FEWEST = 2 * DEGREE + 2
+"""Pieces that a path has at least: more than a change of a control point reaches."""
+
+STRAIGHT = 1e-8
+"""What counts as straight, in rad."""
+
 
 @dataclass(frozen=True, eq=False)
 class Polyline:
@@ -117,14 +123,15 @@ def rounded_path(
     progress : callable, optional
         Called with "round" and the share of the way that is done.
     """
-    n_pieces = max(4, int(np.ceil(line.length / SPACING)))
+    n_pieces = max(FEWEST, int(np.ceil(line.length / SPACING)))
     breaks = np.linspace(0.0, line.length, n_pieces + 1)
     stale = np.ones(n_pieces, dtype=bool)
     off = np.zeros(n_pieces)
     for number in range(ROUNDS + 1):
-        spline = _spline(line, kinematics, breaks, release)
+        spline, bends_early = _spline(line, kinematics, breaks, release)
         off[stale] = _deviations(line, kinematics, spline, breaks, np.flatnonzero(stale))
         coarse = off > deviation
+        coarse[-1] |= bends_early
         if progress is not None:
             progress("round", 1.0 - float(coarse.mean()))
         if number == ROUNDS or not coarse.any():
@@ -165,7 +172,10 @@ def release_ways(line: Polyline, n_links: int, *, longest: float, deviation: flo
     return np.asarray(np.minimum(longest, deviation / np.maximum(rates, deviation / longest)))
 
 
-def _spline(line: Polyline, kinematics: Kinematics, breaks: FloatArray, release: FloatArray) -> BSpline:
+def _spline(
+    line: Polyline, kinematics: Kinematics, breaks: FloatArray, release: FloatArray
+) -> tuple[BSpline, bool]:
+    """Return the spline, and whether its last piece bends a joint that is still to be released in it."""
     ends = np.repeat(breaks[[0, -1]], DEGREE)
     knots = np.concatenate([ends[:DEGREE], breaks, ends[DEGREE:]])
     # The averages of knots at which a spline of the line's own values keeps straight lines straight.
@@ -176,7 +186,9 @@ def _spline(line: Polyline, kinematics: Kinematics, breaks: FloatArray, release:
     past = least[:, None] - (n_links - np.arange(n_links) + release)
     held = kinematics.held(control, past)
     held[0], held[-1] = control[0], control[-1]
-    return BSpline(knots, held, DEGREE)
+    # The path ends where the motion does. Where a joint is released in the last piece, that must be shorter.
+    last = kinematics.held(control[-1:], past[-1:] + release)
+    return BSpline(knots, held, DEGREE), bool(np.abs(last - control[-1]).max() > STRAIGHT)
 
 
 def _least_feed(feed: BSpline, breaks: FloatArray) -> FloatArray:

@@ -3,9 +3,9 @@
 1. The poses become a path without corners, a cubic B-spline near them (`planners.export.rounding`).
 2. TOPP-RA finds the fastest way along it within the limits of speed and acceleration, from rest to rest.
 3. What comes of that is sampled at the controller's rate, and the samples become the control points of a
-   cubic B-spline in time. Its speeds and accelerations are averages of those before, so they keep to the limits
-   between the samples, too; they change without a jump; and the cubics through its positions and velocities,
-   which controllers drive, are that spline itself.
+   cubic B-spline in time. Its speeds and accelerations are averages of those before, so they keep to the
+   limits between the samples, too; they change without a jump; and the cubics through its positions and
+   velocities, which controllers drive, are that spline itself.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from planners.spatial.problem import SpatialMotion
 
 __all__ = ["LONGEST", "fastest_duration", "time_parametrise"]
 
-LONGEST = 2_000_000
-"""Samples that a trajectory may have."""
+LONGEST = 20_000_000
+"""Numbers that the positions of a trajectory may be: samples times joints."""
 
 STRETCHES = 12
 """How often the time is stretched at most where limits are found to be exceeded."""
@@ -270,9 +270,9 @@ def _sampled(
     stretch = 1.0
     for _ in range(STRETCHES):
         n = max(1, int(np.ceil(clock[-1, 0] * stretch * rate)))
-        if n > LONGEST:
+        if n * len(speeds) > LONGEST:
             raise InputError(
-                f"Expected a trajectory of at most {LONGEST} samples, got {n}: "
+                f"Expected a trajectory of at most {LONGEST // len(speeds)} samples, got {n}: "
                 "lower the rate or raise the limits."
             )
         reached = _place_at(clock, places, np.linspace(0.0, clock[-1, 0], n + 1))

@@ -26,7 +26,7 @@ __all__ = ["gif_bytes", "mp4_bytes"]
 FASTEST, SLOWEST = {"gif": 15, "mp4": 30}, {"gif": 2, "mp4": 5}
 """Frames per second."""
 
-MOST_FRAMES = {"gif": 400, "mp4": 1500}
+MOST_FRAMES = {"gif": 400, "mp4": 2500}
 """Longer videos show fewer frames per second, and still take as long as the arm."""
 
 HEIGHT = 4.8

@@ -237,6 +237,12 @@ def _far_end(points: FloatArray, i: int, near: int, far: int, squared: float) ->
 
 
 @njit(cache=True)
+def segment_at(place: float, n: int) -> int:
+    """Return the segment that holds a place given as an index with a fraction; the last sample is of the last."""
+    return min(int(place), n - 2)
+
+
+@njit(cache=True)
 def push_chords(
     points: FloatArray, fixed: int, length: float, boxes: FloatArray, near: Near, rear: FloatArray,
     front: FloatArray, pushes: FloatArray, weights: FloatArray,
@@ -282,7 +288,7 @@ def _straighten(
     for i in range(fixed, points.shape[0]):
         if front[i] < 0.0:
             continue
-        j, k = int(rear[i]), int(front[i])
+        j, k = segment_at(rear[i], points.shape[0]), segment_at(front[i], points.shape[0])
         g, f = rear[i] - j, front[i] - k
         height = 0.0
         for c in range(3):
@@ -324,8 +330,10 @@ def _bend_out(
     axis = points[fixed - 1] - points[0]
     axis *= length / np.sqrt((axis**2).sum())
     for i in range(fixed):
-        k = int(front[i])
-        if front[i] < 0.0 or k + 1 < fixed:
+        if front[i] < 0.0:
+            continue
+        k = segment_at(front[i], points.shape[0])
+        if k + 1 < fixed:
             continue
         if not demand.straight:
             axis = points[i + 1] - points[i] if i + 1 < fixed else points[i] - points[i - 1]
@@ -356,9 +364,9 @@ def _turn_along(
     """
     n, length = points.shape[0], demand.length
     for i in range(fixed, n):
-        k = int(rear[i])
-        if k < 0:
+        if rear[i] < 0.0:
             continue
+        k = segment_at(rear[i], n)
         size, slope, chord = 0.0, 0.0, np.empty(3)
         for c in range(3):
             way = points[k + 1, c] - points[k, c]
