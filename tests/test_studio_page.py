@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import CONTROL, SHIFT, Page
+from shapely.geometry import Point
 
 pytest.importorskip("fastapi")
 pytest.importorskip("uvicorn")
@@ -146,7 +147,7 @@ def test_a_corridor_is_drawn_with_the_mouse_and_planned(studio):
     page.watch()
 
 
-def test_walls_are_what_was_drawn_last(studio):
+def test_a_square_pillar_is_dragged_open_undone_and_done_again(studio):
     page = studio()
     page.evaluate("studio.editor.options.snap = false, studio.editor.options.pillar = 'square'")
     page.click_on("[data-tool=pillar]")
@@ -155,16 +156,33 @@ def test_walls_are_what_was_drawn_last(studio):
     np.testing.assert_allclose(
         [corners.min(axis=0), corners.max(axis=0)], [[-40, 1000], [40, 1080]], atol=2.0
     )
-    places = [[0, 900], [0, 1040], [0, 1200], [400, 0]]
-    module = (
-        "import('/page/scene.js').then(({ isFree }) =>"
-        f" {places}.map(([x, y]) => isFree(studio.store.scene, x, y)))"
-    )
-    assert page.evaluate(module) == [True, False, True, False]
     page.key("z", modifiers=CONTROL)
     assert len(page.scene()["shapes"]) == 1
     page.key("y", modifiers=CONTROL)
     assert len(page.scene()["shapes"]) == 2
+
+
+def test_what_is_seen_as_free_is_what_is_planned_in(studio):
+    from planners.studio.scene import Scene, maze_from_scene
+
+    ring, hole = [[-300, 300], [700, 250], [800, 900], [-250, 800]], [[0, 500], [90, 520], [60, 600]]
+    shapes = [
+        {"role": "free", "rings": [ring, hole]},
+        {"role": "wall", "line": [[100, 300], [200, 700], [500, 450]], "width": 60},
+        {"role": "free", "line": [[150, 500], [400, 650], [600, 200], [650, 700]], "width": 40},
+        {"role": "wall", "rings": [[[-150, 350], [-50, 350], [-50, 450], [-150, 450]]]},
+    ]
+    page = studio()
+    page.evaluate(f"studio.store.change({{ shapes: {shapes}, base: [-200, 600, 0], goal: [700, 800] }})")
+    maze = maze_from_scene(Scene.model_validate_json(json.dumps(page.scene())))
+    places = np.random.default_rng(0).uniform([-350, 200], [850, 950], (400, 2))
+    points = [Point(place) for place in places]
+    clear = [point.distance(maze.free_space.boundary) > 0.5 for point in points]
+    module = "import('/page/scene.js').then(({ isFree }) => "
+    free = page.evaluate(f"{module}{places.tolist()}.map(([x, y]) => isFree(studio.store.scene, x, y)))")
+    expected = [maze.free_space.contains(point) for point in points]
+    assert np.array(free)[clear].tolist() == np.array(expected)[clear].tolist()
+    assert 50 < sum(expected) < 350
 
 
 def test_base_goal_and_corners_are_dragged(studio):

@@ -1,7 +1,7 @@
 // Mouse, touch and keys on the canvas. All of them end in the same few acts: a place is set, something is taken
 // hold of, moved and dropped.
 
-import { tidy } from "./scene.js";
+import { EDGE, tidy } from "./scene.js";
 import { DRAWING, MOVING, grabAt, marksOf, handlesOf, shapeName, straightened, withoutCorner } from "./tools.js";
 import { drawBase, drawCrosshair, drawDraft, drawFailure, drawGoal, drawSelection } from "./overlay.js";
 import { numberText } from "./view.js";
@@ -63,10 +63,9 @@ export class Editor {
 
   // Places
 
-  snapped([x, y]) {
-    if (!this.options.snap) return [tidy(x), tidy(y)];
-    const step = this.view.gridStep;
-    return [tidy(Math.round(x / step) * step), tidy(Math.round(y / step) * step)];
+  snapped(place) {
+    const step = this.view.gridStep, within = (value) => Math.min(Math.max(value, -EDGE), EDGE);
+    return place.map((value) => tidy(within(this.options.snap ? Math.round(value / step) * step : value)));
   }
   placeOf(event, straight = event.shiftKey) {
     const box = this.canvas.getBoundingClientRect();
@@ -296,7 +295,9 @@ export class Editor {
       this.say(`Heading ${numberText(this.store.scene.base[2])} degrees.`);
       return;
     }
-    this.cursor = [tidy(this.cursor[0] + dx), tidy(this.cursor[1] + dy)];
+    const at = [this.cursor[0] + dx, this.cursor[1] + dy];
+    if (Math.max(...at.map(Math.abs)) > EDGE) return;
+    this.cursor = at.map(tidy);
     if (this.grab) this.moveTo(this.cursor);
     if (this.points.length) this.next = this.cursor;
     this.view.reveal(...this.cursor);

@@ -12,6 +12,9 @@ export const EMPTY = { name: "my-maze", units: "mm", shapes: [], base: null, goa
 
 const FARTHEST = 1e9, MAX_POINTS = 20000; // the server's limits, too
 
+/** Nothing is drawn farther out than this. */
+export const EDGE = 0.9 * FARTHEST;
+
 const isNumber = (value) => typeof value === "number" && Number.isFinite(value) && Math.abs(value) < FARTHEST;
 const isPlace = (value) => Array.isArray(value) && value.length >= 2 && isNumber(value[0]) && isNumber(value[1]);
 
@@ -66,6 +69,7 @@ export function withPoints(shape, ring, points) {
 }
 
 export function moved(shape, dx, dy) {
+  if (pointsOf(shape).some(({ x, y }) => Math.abs(x + dx) > EDGE || Math.abs(y + dy) > EDGE)) return shape;
   const shift = (points) => points.map(([x, y]) => [tidy(x + dx), tidy(y + dy)]);
   return shape.line ? { ...shape, line: shift(shape.line) } : { ...shape, rings: shape.rings.map(shift) };
 }

@@ -1,6 +1,6 @@
 // The canvas: what of the scene is seen, and how it is drawn.
 
-import { boundsOf, pathOf, roundStep, setPen } from "./scene.js";
+import { EDGE, boundsOf, pathOf, roundStep, setPen } from "./scene.js";
 
 const NAMES = ["page", "card", "ink", "soft", "line", "accent", "wall", "edge", "free", "goal", "base", "arm", "near", "joint", "bad", "pinch"];
 export const colours = {};
@@ -54,15 +54,16 @@ export class View {
 
   zoomBy(factor, sx = this.width / 2, sy = this.height / 2) {
     const [x, y] = this.toWorld(sx, sy);
-    this.scale = Math.min(Math.max(this.scale * factor, 1e-7), 1e7);
+    this.scale = Math.min(Math.max(this.scale * factor, 1e-5), 1e7);
     const [nx, ny] = this.toWorld(sx, sy);
     this.x += x - nx;
     this.y += y - ny;
-    this.redraw();
+    this.panBy(0, 0);
   }
   panBy(dx, dy) {
-    this.x -= dx / this.scale;
-    this.y += dy / this.scale;
+    const kept = (value) => Math.min(Math.max(value, -EDGE), EDGE);
+    this.x = kept(this.x - dx / this.scale);
+    this.y = kept(this.y + dy / this.scale);
     this.redraw();
   }
   fit(scene = this.scene) {
