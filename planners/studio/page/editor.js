@@ -83,6 +83,7 @@ export class Editor {
     if (last && this.apart(last, place) < SLIP) return this.finish();
     if (tool.closed && points.length >= tool.least && this.apart(points[0], place) < 10) return this.finish();
     points.push(place);
+    this.next = null;
     if (points.length === tool.most) return this.finish();
     this.say(`${tool.name}: point ${points.length} at ${numberText(place[0])}, ${numberText(place[1])}.`);
     this.changed();
