@@ -80,7 +80,8 @@ export class Exporter {
       byId("export-progress").textContent = "";
       if (error.kind === "cancelled") return;
       byId("export-problem").hidden = false;
-      byId("export-problem").textContent = error.message;
+      byId("export-problem").textContent = error.message.replace(/ \(--[a-z-]+ [\d.]+\)/, ""); // an option of the command line
+      byId("export-problem").scrollIntoView({ block: "nearest" });
     } finally {
       this.control = null;
       byId("export-go").disabled = false;

@@ -77,7 +77,7 @@ export function longestCard({ result, scene, use, watch }) {
   const card = element("article", { className: `outcome ${result.length > 0 ? "good" : "bad"}` });
   const title = result.length > 0 ? `Longest link: ${numberText(result.length, digits)} ${units}` : "No length passes";
   card.append(element("header", {}, element("h3", { textContent: title })));
-  const bound = result.bound_upper > 0 ? `No link over ${numberText(result.bound_upper, digits)} ${units} can pass, whatever the planner: this is ${(100 * result.index).toFixed(1)} % of it.` : "";
+  const bound = result.bound_upper > 0 ? `No link over ${numberText(result.bound_upper, digits)} ${units} can pass, whatever the planner: this is ${(Math.floor(1000 * result.index + 1e-9) / 10).toFixed(1)} % of it.` : "";
   const rest = result.complete ? "" : " The search was stopped: there may be longer ones.";
   card.append(element("p", { textContent: `${bound}${rest} ${result.note ?? ""}`.trim() || "There is no way for any link." }));
   const rows = (result.table ?? []).filter((row) => row.link_length > 0);
