@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_replay import Browser, Page, browser  # noqa
+from browser import Page
 
 pytest.importorskip("fastapi")
 pytest.importorskip("uvicorn")
