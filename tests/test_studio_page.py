@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import Page
+from test_replay import Browser, Page, browser  # noqa
 
 pytest.importorskip("fastapi")
 pytest.importorskip("uvicorn")
