@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+from pathlib import Path
 from typing import Annotated
 from urllib.parse import quote
 
@@ -36,14 +37,17 @@ def studio_command(
 ) -> None:
     """Draw mazes, plan, watch and export on a page in the browser. Ctrl-C ends it."""
     _check(port, jobs, time_limit)
-    start = None if maze is None else Maze.load(maze)
+    world = None if maze is None else Maze.load(maze)
+    # A maze of a file is handed to the server; named ones it knows, with link lengths that suit them.
+    start = world if maze is not None and Path(maze).suffix else None
+    name = maze if start is None else start.name
     from planners.studio.limits import Limits
     from planners.studio.running import listening_socket, open_browser, serve, server_on
 
     listener = listening_socket(host, port)
     bound = listener.getsockname()[1]
     shown = "127.0.0.1" if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host.strip("[]") else host
-    url = f"http://{shown}:{bound}/" + ("" if start is None else f"?maze={quote(start.name)}")
+    url = f"http://{shown}:{bound}/" + ("" if name is None else f"?maze={quote(name)}")
 
     def ready() -> None:
         if port not in (0, bound):

@@ -8,6 +8,7 @@ import json
 import re
 import time
 import zlib
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -19,7 +20,8 @@ from hrsnake_env.contacts import PINCH_TOLERANCE, Contact
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import fig19
-from hrsnake_env.replay import QUANTUM, Trace, replay_html, save_replay, show
+from hrsnake_env.pages import filled
+from hrsnake_env.replay import QUANTUM, Trace, replay_html, replay_payload, save_replay, show
 from planners import plan
 from planners.rollout import simulate_motion
 
@@ -511,6 +513,121 @@ def test_a_page_that_fails_says_so(browser, tmp_path):
         assert time.monotonic() < end
         time.sleep(0.05)
     browser.call("Target.closeTarget", targetId=attached)
+
+
+# Players on a page of someone else's
+
+EMBEDDING = """<!DOCTYPE html><html><head><title>__TITLE__</title><style>__STYLE__
+  html { --card: rgb(1, 2, 3); } button { width: 500px; } .host { height: 300px; overflow: auto; }
+</style><script>__SCRIPT__</script></head>
+<body><input id="name"><div class="host"></div><div class="host"></div>
+<script type="application/json" id="payload">__PAYLOAD__</script><script>
+const root = document.documentElement, hosts = document.querySelectorAll(".host");
+root.dataset.errors = "";
+for (const type of ["error", "unhandledrejection"])
+  window.addEventListener(type, (event) => { root.dataset.errors += event.message || event.reason; });
+const payload = JSON.parse(document.getElementById("payload").textContent);
+const players = [];
+const mounted = (host, settings) =>
+  HrsnakePlayer.mount(hosts[host], payload, { autoplay: false, ...settings });
+Promise.all([mounted(0), mounted(1)]).then((both) => { players.push(...both); root.dataset.ready = "1"; });
+</script></body></html>"""
+
+
+@pytest.fixture
+def embedding(browser, tmp_path):
+    """Return a page that holds two players, in `hosts`, which `players` lists."""
+    parts = [
+        files("hrsnake_env").joinpath(name).read_text(encoding="utf-8")
+        for name in ("player.css", "player.js")
+    ]
+    out = tmp_path / "embedding.html"
+    page = filled(EMBEDDING, "two", replay_payload([waving()]), style=parts[0], script=parts[1])
+    out.write_text(page, encoding="utf-8")
+    page = Page(browser, out.as_uri(), 1000, 700)
+    yield page
+    page.close()
+
+
+def test_players_on_one_page_do_not_disturb_each_other(embedding):
+    embedding.evaluate("(players[0].goTo(5), players[1].goTo(9), players[1].zoomBy(3), players[1].play(), 0)")
+    embedding.wait("players[1].pose > 12")
+    assert embedding.evaluate("[players[0].pose, players[0].playing, hosts[0].dataset.pose]") == [
+        5,
+        False,
+        "5",
+    ]
+    assert embedding.evaluate("players.map((player) => player.views[0].view.zoom)") == [1, 3]
+    embedding.evaluate("(players[1].pause(), players[1].goTo(9), 0)")
+    embedding.click_on(".host:nth-of-type(1) .hp-forward")
+    embedding.key("ArrowRight")  # goes to the one that has the focus
+    embedding.click_on("#name")
+    embedding.key("ArrowRight")  # goes to none
+    assert embedding.evaluate("players.map((player) => player.pose)") == [7, 9]
+
+
+def test_a_player_takes_the_colours_of_its_page_and_keeps_its_own_shape(embedding):
+    assert embedding.evaluate("players[0].style.card") == "#010203"
+    assert embedding.evaluate("document.querySelector('.hp-back').getBoundingClientRect().width") == 36
+    assert embedding.evaluate("hosts[0].scrollWidth <= hosts[0].clientWidth")
+
+
+def test_a_player_tells_of_its_poses_until_it_is_no_longer_asked(embedding):
+    embedding.evaluate("(window.told = [], window.end = players[0].on('pose', (pose) => told.push(pose)), 0)")
+    for pose in (3, 3, 20):
+        embedding.evaluate(f"(players[0].goTo({pose}), 0)")
+        embedding.frames()
+    embedding.evaluate("(end(), players[0].goTo(30), 0)")
+    embedding.frames()
+    assert embedding.evaluate("told") == [3, 20]
+
+
+def test_a_destroyed_player_leaves_nothing_running(embedding):
+    embedding.evaluate(
+        "(players[0].setSpeed(8), players[0].play(), players[0].goTo(2), players[0].destroy(), 0)"
+    )
+    pose = embedding.evaluate("players[0].pose")
+    assert embedding.evaluate("[hosts[0].outerHTML, hosts[0].children.length]") == [
+        '<div class="host" style=""></div>',
+        0,
+    ]
+    embedding.evaluate(
+        "(window.drawn = 0, players[0].on('draw', () => drawn++), players[0].redraw(), players[0].play(), 0)"
+    )
+    embedding.evaluate("(hosts[0].dispatchEvent(new KeyboardEvent('keydown', { key: 'End' })), 0)")
+    embedding.resize(600, 700)
+    embedding.set_scheme(dark=True)
+    embedding.frames(5)
+    assert embedding.evaluate("[players[0].pose, players[0].playing, drawn]") == [pose, False, 0]
+    assert embedding.evaluate("hosts[0].outerHTML") == '<div class="host" style=""></div>'
+    assert embedding.evaluate("players[1].style.free") == "#12161b"  # the other one still listens
+
+
+def test_a_later_player_takes_the_place_of_the_one_before(embedding):
+    embedding.evaluate(
+        "(async () => { const first = mounted(0).catch((error) => error.name);"
+        " const second = mounted(0); players.push(await first, await second); })()"
+    )
+    assert embedding.evaluate("players[2]") == "AbortError"
+    embedding.evaluate("(players[0].goTo(30), players[3].goTo(4), 0)")
+    embedding.frames()
+    assert embedding.evaluate("[hosts[0].children.length, hosts[0].dataset.pose]") == [1, "4"]
+
+
+def test_frame_times_are_kept_of_playing_alone(embedding):
+    embedding.evaluate("mounted(0, { timing: true }).then((player) => players.push(player))")
+    embedding.evaluate("(players[2].goTo(3), 0)")
+    embedding.frames(3)
+    assert embedding.evaluate("players[2].frameTimes()") == {"intervals": [], "draws": []}
+    embedding.evaluate("(players[2].play(), 0)")
+    embedding.wait("players[2].frameTimes().draws.length > 3")
+    times = embedding.evaluate("players[2].frameTimes()")
+    assert len(times["intervals"]) >= 4 and all(value >= 0 for part in times.values() for value in part)
+
+
+def test_what_a_page_fetches_is_what_a_replay_holds():
+    traces = [waving(), waving(title=EVIL)]
+    assert payload_of(replay_html(traces)) == json.loads(json.dumps(replay_payload(traces)))
 
 
 @pytest.mark.image
