@@ -238,7 +238,7 @@ def _far_end(points: FloatArray, i: int, near: int, far: int, squared: float) ->
 
 @njit(cache=True)
 def segment_at(place: float, n: int) -> int:
-    """Return the segment that holds a place given as an index with a fraction; the last sample is of the last."""
+    """Return the segment that holds a place, an index with a fraction; the last sample is the last one's."""
     return min(int(place), n - 2)
 
 
