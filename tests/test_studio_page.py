@@ -28,6 +28,7 @@ SOLVED = "document.documentElement.dataset.view === 'watch' && studio.watch.play
 ANSWERED = (
     "(document.querySelector('#outcomes .outcome') !== null || !document.getElementById('alert').hidden)"
 )
+COMPILING = 240.0  # s: in a fresh checkout the first plan waits for the kernels to be compiled
 IDLE = "document.documentElement.dataset.busy === '0'"
 
 
@@ -61,6 +62,9 @@ def studio(browser, address):
 
 class Studio(Page):
     """Drive the page as a user does; places are in maze units."""
+
+    def wait(self, condition, patience=COMPILING):
+        super().wait(condition, patience)
 
     def text(self, query):
         """Return the text of the first part that fits a query."""
