@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -386,19 +388,28 @@ def commands(group=None, path=()):
             yield (*path, name), command
 
 
-def test_every_example_of_the_help_is_a_command_that_is_understood():
-    shown = [
-        line.split()
-        for _, command in commands()
-        for line in (command.epilog or "").splitlines()
-        if line.strip().startswith("hrsnake ")
-    ]
+def examples():
+    """Yield the commands that help pages, the README and docs/ show, with where they do."""
+    for name, command in commands():
+        for line in (command.epilog or "").splitlines():
+            yield " ".join(name), line.strip()
+    root = Path(__file__).parent.parent
+    for page in (root / "README.md", *sorted((root / "docs").glob("*.md"))):
+        text = page.read_text().replace("\\\n", " ")
+        for line in re.findall(r"^(?:    |\$ )(hrsnake .*)$", text, flags=re.MULTILINE):
+            yield page.name, line
+
+
+def test_every_example_is_a_command_that_is_understood():
+    shown = [(where, line) for where, line in examples() if line.startswith("hrsnake ")]
     named = dict(commands())
-    assert len(shown) >= 11
-    for _, *words in shown:
-        name = max((name for name in named if words[: len(name)] == [*name]), key=len)
-        arguments = words[len(name) :]
-        assert named[name].make_context(name[-1], arguments).command is named[name]
+    assert len(shown) >= 50
+    for where, line in shown:
+        words = shlex.split(line, comments=True)[1:]
+        name = max((name for name in named if words[: len(name)] == [*name]), key=len, default=None)
+        assert name is not None, (where, line)
+        context = named[name].make_context(name[-1], words[len(name) :])
+        assert context.command is named[name], (where, line)
 
 
 def test_the_shell_completes_mazes_files_and_planners(run, monkeypatch):
