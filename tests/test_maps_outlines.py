@@ -266,6 +266,36 @@ def test_what_crosses_a_larger_outline_is_an_obstacle() -> None:
     assert any("crossing" in note for note in reading.notes)
 
 
+@pytest.mark.parametrize("tolerance", [0.0, 1.0, 5.0])
+def test_no_wall_is_lost_that_is_thinner_than_the_tolerance(tolerance: float) -> None:
+    room, pillar = box(0, 0, 200, 200), box(80, 80, 120, 120)
+    walls = [
+        pillar,
+        box(100, 99, 180, 101),
+        box(90, 40, 91, 100),
+        box(40, 60, 180, 60.5),
+        box(-5, 30, 99, 32),
+    ]
+    walls += [box(41, 60.1, 170, 60.6), box(98, 70, 99, 119)]  # twice, all but; and a room in the pillar
+    for order in (1, -1):
+        free = rings(*[room, *walls][::order], tolerance=tolerance).free_space
+        hall = max(shapely.get_parts(free), key=lambda part: part.area)
+        assert max(hall.intersection(wall).area for wall in walls) < 1e-9
+        assert hall.area > 0.9 * room.difference(shapely.union_all(walls)).area
+
+
+@settings(max_examples=25)
+@given(
+    st.lists(st.tuples(*[st.floats(5, 190)] * 2, *[st.floats(0.05, 60)] * 2), min_size=2, max_size=6),
+    st.sampled_from([0.0, 0.3, 3.0]),
+)
+def test_what_a_drawing_has_as_obstacles_is_free_nowhere(sizes: list, tolerance: float) -> None:
+    obstacles = [box(x, y, min(x + wide, 195), min(y + high, 195)) for x, y, wide, high in sizes]
+    free = rings(box(0, 0, 200, 200), *obstacles, tolerance=tolerance).free_space
+    hall = max(shapely.get_parts(free), key=lambda part: box(*part.bounds).area)
+    assert max(hall.intersection(wall).area for wall in obstacles) < 1e-6
+
+
 def test_rooms_that_share_a_wall_stay_apart() -> None:
     reading = rings(box(0, 0, 5, 10), box(5, 0, 10, 10), box(2, 2, 3, 3))
     assert len(reading.parts) == 2
