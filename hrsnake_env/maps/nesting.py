@@ -222,7 +222,7 @@ def _within(areas: np.ndarray, others: np.ndarray, gap: float) -> np.ndarray:
     sides, limits = shapely.bounds(areas), shapely.bounds(others) + np.array([-gap, -gap, gap, gap])
     within = ((sides[:, :2] >= limits[:, :2]) & (sides[:, 2:] <= limits[:, 2:])).all(axis=1)
     within[within] = _near(shapely.difference(areas[within], others[within]), others[within], gap)
-    return within
+    return np.asarray(within)
 
 
 def _near(shapes: np.ndarray, others: np.ndarray, gap: float) -> np.ndarray:

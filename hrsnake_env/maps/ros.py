@@ -194,4 +194,4 @@ def _number(fields: dict[Any, Any], key: str, name: str) -> float:
     value = _as_written(fields.get(key))
     if not _is_number(value):
         raise InputError(f"Expected a number as '{key}' in '{name}', got {reprlib.repr(value)}.")
-    return float(value)  # type: ignore[arg-type]
+    return float(value)
