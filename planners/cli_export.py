@@ -71,7 +71,10 @@ def export_command(
     ] = None,
     metres_per_unit: Annotated[
         float | None,
-        typer.Option("--metres-per-unit", help="For ROS 2 and URDF; known for m, cm, mm, in and ft."),
+        typer.Option(
+            "--metres-per-unit",
+            help="For ROS 2 and URDF; known for m, cm, mm, in, ft and other units of length.",
+        ),
     ] = None,
     link_radius: RadiusOption = 0.0,
     joint_limit: LimitOption = None,

@@ -73,7 +73,7 @@ def import_command(
         typer.Option(
             "--units",
             rich_help_panel=SIZES,
-            help="Of the maze: mm, cm, m, in, ft. A map that says its own is converted.",
+            help="Of the maze: mm, cm, m, in, ft, yd. A map that says its own is converted.",
         ),
     ] = None,
     scale: Annotated[

@@ -266,6 +266,36 @@ def test_what_crosses_a_larger_outline_is_an_obstacle() -> None:
     assert any("crossing" in note for note in reading.notes)
 
 
+@pytest.mark.parametrize("tolerance", [0.0, 1.0, 5.0])
+def test_no_wall_is_lost_that_is_thinner_than_the_tolerance(tolerance: float) -> None:
+    room, pillar = box(0, 0, 200, 200), box(80, 80, 120, 120)
+    walls = [
+        pillar,
+        box(100, 99, 180, 101),
+        box(90, 40, 91, 100),
+        box(40, 60, 180, 60.5),
+        box(-5, 30, 99, 32),
+    ]
+    walls += [box(41, 60.1, 170, 60.6), box(98, 70, 99, 119)]  # twice, all but; and a room in the pillar
+    for order in (1, -1):
+        free = rings(*[room, *walls][::order], tolerance=tolerance).free_space
+        hall = max(shapely.get_parts(free), key=lambda part: part.area)
+        assert max(hall.intersection(wall).area for wall in walls) < 1e-9
+        assert hall.area > 0.9 * room.difference(shapely.union_all(walls)).area
+
+
+@settings(max_examples=25)
+@given(
+    st.lists(st.tuples(*[st.floats(5, 190)] * 2, *[st.floats(0.05, 60)] * 2), min_size=2, max_size=6),
+    st.sampled_from([0.0, 0.3, 3.0]),
+)
+def test_what_a_drawing_has_as_obstacles_is_free_nowhere(sizes: list, tolerance: float) -> None:
+    obstacles = [box(x, y, min(x + wide, 195), min(y + high, 195)) for x, y, wide, high in sizes]
+    free = rings(box(0, 0, 200, 200), *obstacles, tolerance=tolerance).free_space
+    hall = max(shapely.get_parts(free), key=lambda part: box(*part.bounds).area)
+    assert max(hall.intersection(wall).area for wall in obstacles) < 1e-6
+
+
 def test_rooms_that_share_a_wall_stay_apart() -> None:
     reading = rings(box(0, 0, 5, 10), box(5, 0, 10, 10), box(2, 2, 3, 3))
     assert len(reading.parts) == 2
@@ -553,7 +583,9 @@ def test_blocks_are_placed_turned_and_scaled_as_the_library_does() -> None:
     assert shapely.distance(holes, shapely.points(walls)).max() < 1e-3
 
 
-@pytest.mark.parametrize(("code", "factor"), [(1, 25.4), (2, 304.8), (4, 1.0), (5, 10.0), (6, 1000.0)])
+@pytest.mark.parametrize(
+    ("code", "factor"), [(1, 25.4), (2, 304.8), (4, 1.0), (5, 10.0), (6, 1000.0), (10, 914.4)]
+)
 def test_units_are_turned_into_each_other(code: int, factor: float) -> None:
     document = ezdxf.new(units=code)
     document.modelspace().add_lwpolyline([(0, 0), (1, 0), (1, 2), (0, 2)], close=True)
@@ -582,6 +614,32 @@ def test_hidden_layers_and_unknown_entities_are_left_out_and_said() -> None:
     assert reading.free_space.area == pytest.approx(81)
     said = " ".join(reading.notes)
     assert "1 MTEXT, 1 TEXT" in said and "2 entities" in said and "1 hatch" in said
+
+
+@pytest.mark.parametrize(("state", "obstacles"), [("on", 3), ("off", 1), ("freeze", 0)])
+def test_a_block_shows_as_its_layers_and_that_of_its_insertion_do(state: str, obstacles: int) -> None:
+    def draw(space) -> None:
+        layers = space.doc.layers
+        layers.get("0").off()  # what is on it in a block is on the layer of the insertion
+        for layer in ("ROOM", "INSERTED", "OWN"):
+            layers.add(layer)
+        getattr(layers.get("INSERTED"), state)()
+        block = space.doc.blocks.new("COLUMN")
+        for x, layer in ((1, "0"), (3, "0"), (5, "OWN")):
+            block.add_circle((x, 1), 0.5, dxfattribs={"layer": layer})
+        space.add_lwpolyline([(0, 0), (9, 0), (9, 9), (0, 9)], close=True, dxfattribs={"layer": "ROOM"})
+        space.add_blockref("COLUMN", (1, 1), dxfattribs={"layer": "INSERTED"})
+
+    assert len(reading_of("dxf", dxf(draw)).free_space.interiors) == obstacles
+
+
+def test_faces_are_solid_and_multiple_lines_are_walls_too() -> None:
+    def draw(space) -> None:
+        space.add_lwpolyline([(0, 0), (9, 0), (9, 9), (0, 9)], close=True)
+        space.add_3dface([(1, 1), (2, 1), (2, 2), (1, 2)])
+        space.add_mline([(4, 4), (8, 4), (8, 8), (4, 8)], close=True)
+
+    assert reading_of("dxf", dxf(draw)).free_space.area == pytest.approx(81 - 1 - 36 + 16)
 
 
 def test_a_hatch_of_a_named_layer_is_solid_but_for_its_islands() -> None:

@@ -259,6 +259,33 @@ def test_the_origin_turns_the_map_about_its_lower_left_corner():
     assert read_map("m.yaml", None, files).free_space.bounds == pytest.approx((0.8, 2.0, 1.0, 2.4))
 
 
+@pytest.mark.parametrize("text", ["5e-2", "'0.05'", "5.0e-2"])
+def test_numbers_are_read_as_ros_reads_them(text):
+    levels = np.full((2, 4), 255, dtype=np.uint8)
+    files = uploads(m_yaml=header(resolution=text, origin=f"[-1e0, {text}, 0]"), m_png=stored(levels))
+    assert read_map("m.yaml", None, files).free_space.bounds == pytest.approx((-1.0, 0.05, -0.8, 0.15))
+
+
+def test_units_of_unknown_length_are_refused_where_a_map_has_its_own():
+    with pytest.raises(InputError, match=r"'millimeters'.*in m.*\bmm\b"):
+        read_map(SAMPLES / "ros_house.yaml", MapOptions(units="millimeters"))
+    assert read_map(SAMPLES / "ros_house.yaml", MapOptions(units="steps", scale=1.4)).units == "steps"
+    assert read_map(SAMPLES / "image_house.png", MapOptions(units="steps")).units == "steps"
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "unused"),
+    [
+        ("image_house.png", {"free": ("a",), "wall_thickness": 2.0}, "free, wall_thickness"),
+        ("ros_house.yaml", {"threshold": 0.5, "invert": True}, "threshold, invert"),
+        ("svg_corridor.svg", {"resolution": 0.05}, "resolution"),
+    ],
+)
+def test_options_that_mean_nothing_to_a_map_are_named(name, options, unused):
+    assert read_map(SAMPLES / name, MapOptions(**options)).notes[-1].endswith(f": {unused}.")
+    assert not any("Not used" in note for note in read_map(SAMPLES / name).notes)
+
+
 def test_trinary_maps_are_free_under_the_one_and_walls_over_the_other_threshold():
     row = np.array([[255, 254, 192, 191, 128, 50, 0]], dtype=np.uint8)  # occupancy 0.247 at 192
     assert states_of(row) == [True, True, True, False, False, False, False]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import os
 from pathlib import Path, PurePath
@@ -21,6 +22,16 @@ ENDINGS = {
     **dict.fromkeys((".geojson", ".json"), "geojson"),
 }
 """Which module reads a file, by the file's ending."""
+
+OF_PIXELS = ("resolution", "threshold", "invert", "unknown_is_free")
+OF_OUTLINES = ("free", "walls", "base", "goal", "ignore", "wall_thickness")
+
+UNUSED = {
+    "ros": ("threshold", "invert", *OF_OUTLINES),
+    "image": ("unknown_is_free", *OF_OUTLINES),
+    **dict.fromkeys(("svg", "dxf", "geojson"), OF_PIXELS),
+}
+"""Options that mean nothing to a reader."""
 
 
 def read_map(
@@ -58,5 +69,10 @@ def read_map(
     name, source_files = (
         (path.name, files_beside(Path(path))) if files is None else (os.fspath(source), files)
     )
-    reading: MapReading = read(name, source_files, MapOptions() if options is None else options)
+    options = MapOptions() if options is None else options
+    reading: MapReading = read(name, source_files, options)
+    unused = [key for key in UNUSED[kind] if getattr(options, key) != getattr(MapOptions, key)]
+    if unused:
+        said = f"Not used, for they mean nothing to this kind of map: {', '.join(unused)}."
+        reading = dataclasses.replace(reading, notes=(*reading.notes, said))
     return reading

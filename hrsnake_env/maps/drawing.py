@@ -10,11 +10,9 @@ import numpy as np
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.errors import InputError
 from hrsnake_env.maps.flatten import MAX_POINTS, Arc, Piece
+from hrsnake_env.maps.reading import METRES, converts
 
-__all__ = ["UNITS", "Drawing", "Outline", "Stroke", "counted", "factor", "scaled", "sound"]
-
-UNITS = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 0.1, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048}
-"""Lengths in m of the units that can be turned into each other."""
+__all__ = ["Drawing", "Outline", "Stroke", "counted", "factor", "scaled", "sound"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -115,8 +113,8 @@ class Drawing:
 def factor(drawing: Drawing, units: str | None, scale: float) -> tuple[float, str]:
     """Return maze units per unit of the drawing, and a sentence that says so."""
     own = drawing.units
-    if scale == 1.0 and own in UNITS and units in UNITS and units != own:
-        scale = UNITS[own] / UNITS[units]
+    if own is not None and units is not None and converts(own, units, scale):
+        scale = METRES[own] / METRES[units]
     if scale == 1.0:
         return 1.0, f"The drawing is in {own}." if own else "The drawing does not say its units."
     return scale, f"One {own or 'unit'} of the drawing is {scale:g} {units or own or 'units'}."

@@ -28,7 +28,7 @@ MAX_DEPTH = 32
 MAX_ENTITIES = 500_000
 """Entities after all blocks are inserted."""
 
-UNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 13: "um", 14: "dm"}
+UNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 10: "yd", 13: "um", 14: "dm"}
 """Of $INSUNITS."""
 
 Parsed = tuple[tuple[Stroke, ...], float | None]
@@ -143,12 +143,15 @@ class _Reader:
             return
         own = str(entity.dxf.get("layer", "0"))
         layer = above if own == "0" else own
-        if self._is_hidden(entity, own):
+        if self._is_hidden(entity, layer):
             self.hidden += 1
             return
         own_colour = self._colour(entity, layer, colour)
         if kind == "INSERT":
             yield from self._inserted(entity, layer, own_colour, depth)
+            return
+        if kind == "MLINE":
+            yield from self._inside(entity, layer, own_colour, depth)
             return
         try:
             parsed = _parsed(entity)
@@ -200,17 +203,25 @@ class _Reader:
             return
         count = insert.mcount
         for one in insert.multi_insert() if count > 1 else (insert,):
-            try:
-                inside = list(one.virtual_entities())
-            except Exception:  # as above
-                self.broken["INSERT"] += 1
-                continue
-            for entity in inside:
-                yield from self._outlines(entity, layer, colour, depth + 1)
+            yield from self._inside(one, layer, colour, depth)
+
+    def _inside(self, entity: Any, layer: str, colour: str | None, depth: int) -> Iterator[Outline]:
+        """Yield what an entity is made of."""
+        try:
+            inside = list(entity.virtual_entities())
+        except Exception:  # as above
+            self.broken[entity.dxftype()] += 1
+            return
+        for part in inside:
+            yield from self._outlines(part, layer, colour, depth + 1)
 
     def _is_hidden(self, entity: Any, layer: str) -> bool:
         entry = self.layers.get(layer.casefold())
-        off = entry is not None and (entry.is_off() or entry.is_frozen() or not entry.dxf.get("plot", 1))
+        off = entry is not None and (
+            entry.is_frozen()
+            # What is in a block is on layers of its own, or on this one, and looked at there.
+            or (entity.dxftype() != "INSERT" and (entry.is_off() or not entry.dxf.get("plot", 1)))
+        )
         return bool(off or entity.dxf.get("invisible", 0))
 
     def _colour(self, entity: Any, layer: str, above: str | None) -> str | None:
@@ -259,7 +270,7 @@ def _parsed(entity: Any) -> Parsed | None:
         return (_polyline(bulged, bool(entity.closed), entity.ocs(), float(dxf.elevation)),), None
     if kind == "POLYLINE":
         return _old_polyline(entity)
-    if kind in ("SOLID", "TRACE"):
+    if kind in ("SOLID", "TRACE", "3DFACE"):
         return (Stroke(pieces=(_line(entity.wcs_vertices()),), closed=True),), None
     if kind in ("HATCH", "MPOLYGON"):
         return _hatch(entity), None

@@ -145,7 +145,8 @@ def nested(rings: Sequence[FloatArray], is_wall: Sequence[bool], gap: float, thi
         Of the walls between free spaces that touch.
     """
     areas = np.array([filled(ring) for ring in rings], dtype=object)
-    inner, outer, cross_small, cross_large, twice = _relations(areas, gap)
+    inner, outer, cross_small, cross_large, twin = _relations(areas, gap)
+    twice = twin >= 0
     size = shapely.area(areas)
     parent = np.full(len(areas), -1)
     for i in np.argsort(-size[outer], kind="stable"):  # the smallest around it comes last
@@ -161,44 +162,76 @@ def nested(rings: Sequence[FloatArray], is_wall: Sequence[bool], gap: float, thi
         crossing[i] = free[i] and any(free[j] for j in crossed.get(int(i), ()))
         free[i] &= not crossing[i]
     around = set(zip(inner.tolist(), outer.tolist(), strict=True))
-    obstacles = np.flatnonzero(~free & ~twice)
-    tree = STRtree(areas[obstacles])
+    solid = [(i, areas[i]) for i in np.flatnonzero(~free & (~twice | ~free[twin])).tolist()]
+    # What is within an obstacle, but for a gap, is no way out of it.
+    solid += [
+        (i, shapely.difference(areas[i], areas[parent[i]]))
+        for i in np.flatnonzero(free & (parent >= 0)).tolist()
+        if not areas[parent[i]].covers(areas[i])
+    ]
+    tree = STRtree([area for _, area in solid])
     rooms = []
     for i in np.flatnonzero(free).tolist():
-        near = [
-            j
-            for j in obstacles[tree.query(areas[i], predicate="intersects")].tolist()
-            if (i, j) not in around
-        ]
-        rooms.append(without(even_odd([rings[i]]), areas[near]))
+        near = [solid[k] for k in tree.query(areas[i], predicate="intersects").tolist()]
+        taken = [area for j, area in near if (i, twin[j] if twice[j] else j) not in around]
+        room = without(even_odd([rings[i]]), taken)
+        for j in np.flatnonzero(twin == i).tolist():
+            room = shapely.intersection(room, areas[j])
+        rooms.append(room)
     return Nesting(free_space=_apart(rooms, thickness), free=free, twice=twice, crossing=crossing)
 
 
 def _relations(areas: np.ndarray, gap: float) -> tuple[np.ndarray, ...]:
-    """Return who lies in whom (inner, outer), who crosses whom (smaller, larger), and who is there twice."""
+    """Return who lies in whom (inner, outer), who crosses whom (smaller, larger), who repeats whom, or -1.
+
+    What sticks out of another by no more than the gap lies in it.
+    """
     tree = STRtree(areas)
     outer, inner = tree.query(areas, predicate="covers")
     a, b = tree.query(areas, predicate="overlaps")
     a, b = a[a < b], b[a < b]
-    common = shapely.area(shapely.intersection(areas[a], areas[b]))
-    sliver = gap * np.minimum(shapely.length(areas[a]), shapely.length(areas[b]))
+    shapely.prepare(areas)
     size = shapely.area(areas)
-    a_in_b, b_in_a = size[a] - common <= sliver, size[b] - common <= sliver
-    alike = size[outer] - size[inner] <= gap * shapely.length(areas[inner])
+    a_in_b, b_in_a = _within(areas[a], areas[b], gap), _within(areas[b], areas[a], gap)
+    alike = _within(areas[outer], areas[inner], gap)
     inner, outer = (
         np.concatenate([inner, outer[alike], a[a_in_b], b[b_in_a]]),
         np.concatenate([outer, inner[alike], b[a_in_b], a[b_in_a]]),
     )
     both = set(zip(inner.tolist(), outer.tolist(), strict=True))
-    twice = np.zeros(len(areas), dtype=bool)
-    for i, j in both:
+    twin = np.full(len(areas), -1)
+    for i, j in sorted(both, reverse=True):
         if i > j and (j, i) in both:
-            twice[i] = True
+            twin[i] = j  # the first of them in the end
+    for i in np.flatnonzero(twin >= 0):
+        twin[i] = twin[i] if twin[twin[i]] < 0 else twin[twin[i]]
+    twice = twin >= 0
     real = (inner != outer) & ~twice[inner] & ~twice[outer]
-    cross = (common > sliver) & ~a_in_b & ~b_in_a & ~twice[a] & ~twice[b]
+    cross = ~a_in_b & ~b_in_a & ~twice[a] & ~twice[b]
     a, b = a[cross], b[cross]
+    common, edges = shapely.intersection(areas[a], areas[b]), shapely.boundary(areas)
+    shapely.prepare(edges)
+    deep = ~(_near(common, edges[a], gap) & _near(common, edges[b], gap))
+    a, b = a[deep], b[deep]
     swap = size[a] > size[b]
-    return inner[real], outer[real], np.where(swap, b, a), np.where(swap, a, b), twice
+    return inner[real], outer[real], np.where(swap, b, a), np.where(swap, a, b), twin
+
+
+def _within(areas: np.ndarray, others: np.ndarray, gap: float) -> np.ndarray:
+    """Tell which areas stick out of the other by no more than a gap."""
+    sides, limits = shapely.bounds(areas), shapely.bounds(others) + np.array([-gap, -gap, gap, gap])
+    within = ((sides[:, :2] >= limits[:, :2]) & (sides[:, 2:] <= limits[:, 2:])).all(axis=1)
+    within[within] = _near(shapely.difference(areas[within], others[within]), others[within], gap)
+    return np.asarray(within)
+
+
+def _near(shapes: np.ndarray, others: np.ndarray, gap: float) -> np.ndarray:
+    """Tell which shapes have no corner farther than a gap from the other."""
+    corners, owner = shapely.get_coordinates(shapes, return_index=True)
+    far = ~shapely.dwithin(shapely.points(corners), others[owner], gap)
+    near = np.ones(len(shapes), dtype=bool)
+    near[owner[far]] = False
+    return near
 
 
 def _apart(rooms: list[Polygon | MultiPolygon], thickness: float) -> Polygon | MultiPolygon:

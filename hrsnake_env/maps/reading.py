@@ -14,10 +14,20 @@ from shapely.geometry import MultiPolygon, Point, Polygon
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 
-__all__ = ["MapFiles", "MapOptions", "MapReading", "files_beside", "scale_and_units"]
+__all__ = ["METRES", "MapFiles", "MapOptions", "MapReading", "converts", "files_beside", "scale_and_units"]
 
-METRES = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "um": 1e-6, "km": 1000.0, "in": 0.0254, "ft": 0.3048}
-"""Units that maps name."""
+METRES = {
+    "m": 1.0,
+    "dm": 0.1,
+    "cm": 0.01,
+    "mm": 0.001,
+    "um": 1e-6,
+    "km": 1000.0,
+    "in": 0.0254,
+    "ft": 0.3048,
+    "yd": 0.9144,
+}
+"""Units that maps name, in m."""
 
 MAX_BYTES = 512_000_000
 """Of a file."""
@@ -52,6 +62,23 @@ def files_beside(path: Path) -> MapFiles:
     return read
 
 
+def converts(own: str | None, wanted: str | None, scale: float) -> bool:
+    """Tell whether lengths of a map have to be converted from its own units, as no scale says how.
+
+    Raises
+    ------
+    InputError
+        If nobody knows how long the units are that are wanted.
+    """
+    if scale != 1.0 or own not in METRES or wanted is None or wanted == own:
+        return False
+    if wanted not in METRES:
+        raise InputError(
+            f"Unknown units '{wanted}' for a map in {own}: give a scale, too, or one of: {', '.join(METRES)}."
+        )
+    return True
+
+
 def scale_and_units(units: str, options: MapOptions) -> tuple[float, str]:
     """Return the maze units per unit of a map, and their name.
 
@@ -74,7 +101,7 @@ def scale_and_units(units: str, options: MapOptions) -> tuple[float, str]:
         sizes = {name: METRES.get(units, math.nan) / size for name, size in METRES.items()}
         named = [name for name, size in sizes.items() if math.isclose(size, scale, rel_tol=1e-9)]
         return scale, units if scale == 1.0 else (named[0] if named else f"{1.0 / scale:g} {units}")
-    if scale == 1.0 and units in METRES and wanted in METRES:
+    if converts(units, wanted, scale):
         digits = METRES[units] / METRES[wanted]
         return float(f"{digits:.12g}"), wanted
     return scale, wanted

@@ -115,8 +115,6 @@ def _warnings(pixels: Pixels, header: _Header, options: MapOptions) -> list[str]
                 f"{share:.1%} of the pixels have grey {UNSEEN}, in which map savers write what nobody has "
                 f"seen, but free_thresh {header.free:g} makes them free: 0.196 would not."
             )
-    if options.threshold is not None or options.invert:
-        said.append("Threshold and invert are for plain images; the map's own thresholds and negate hold.")
     if options.resolution is not None and options.resolution != header.resolution:
         said.append(f"The map's resolution of {header.resolution:g} was replaced by {options.resolution:g}.")
     return said
@@ -128,6 +126,7 @@ def _header(data: bytes, name: str) -> _Header:
     if not isinstance(image, str) or not image:
         raise InputError(f"Expected the name of an image as 'image' in '{name}', got {reprlib.repr(image)}.")
     origin = fields.get("origin")
+    origin = [_as_written(value) for value in origin] if isinstance(origin, list) else origin
     if not isinstance(origin, list) or len(origin) != 3 or not all(_is_number(value) for value in origin):
         raise InputError(
             f"Expected 'origin' as three numbers [x, y, yaw] in '{name}', got {reprlib.repr(origin)}."
@@ -177,6 +176,14 @@ def _fields(data: bytes, name: str) -> dict[Any, Any]:
     return fields
 
 
+def _as_written(value: Any) -> Any:
+    """Return the number that a text is, as ROS reads it: to YAML 1.1, `5e-2` is no number without a point."""
+    try:
+        return float(value) if isinstance(value, str) else value
+    except ValueError:
+        return value
+
+
 def _is_number(value: Any) -> bool:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
@@ -184,7 +191,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _number(fields: dict[Any, Any], key: str, name: str) -> float:
-    value = fields.get(key)
+    value = _as_written(fields.get(key))
     if not _is_number(value):
         raise InputError(f"Expected a number as '{key}' in '{name}', got {reprlib.repr(value)}.")
-    return float(value)  # type: ignore[arg-type]
+    return float(value)

@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
-
 from hrsnake_env.arguments import is_number
 from hrsnake_env.errors import InputError
+from hrsnake_env.maps.reading import METRES
 
 __all__ = ["METRES", "metres_in"]
-
-METRES: Mapping[str, float] = MappingProxyType(
-    {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
-)
-"""How long the units of mazes are that have a length; a pixel has none."""
 
 
 def metres_in(units: str, given: float | None = None) -> float:
