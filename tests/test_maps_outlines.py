@@ -797,3 +797,21 @@ def test_too_many_points_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         rings(box(0, 0, 9, 9))
     with pytest.raises(InputError, match="larger tolerance"):
         reading_of("svg", svg('<circle cx="50" cy="50" r="50"/>'), tolerance=1e-13)
+
+
+def winding_walls(path, rule=""):
+    """Return the area that is left of a room of 100 x 100 beside a filled path named wall."""
+    text = (
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100"><rect width="100" height="100"/>'
+        f'<path id="wall" {rule} d="{path}"/></svg>'
+    )
+    return read_svg("a.svg", {"a.svg": text.encode()}.__getitem__, MapOptions()).free_space.area
+
+
+@pytest.mark.parametrize("inner", ["M30 20H50V40H30Z", "M30 30H50V50H30Z"])
+def test_a_path_of_svg_is_filled_by_its_rule(inner):
+    outer, back = "M20 20H60V60H20Z", "M30 30V50H50V30Z"
+    assert winding_walls(f"{outer} {inner}") == pytest.approx(8400.0)
+    assert winding_walls(f"{outer} {inner}", 'fill-rule="evenodd"') == pytest.approx(8800.0)
+    # The other way round it is a hole by both rules; what is enclosed cannot be reached, but is not wall.
+    assert winding_walls(f"{outer} {back}") == pytest.approx(8800.0)

@@ -64,6 +64,7 @@ class Studio(Page):
     """Drive the page as a user does; places are in maze units."""
 
     def wait(self, condition, patience=COMPILING):
+        """Wait until an expression is true."""
         super().wait(condition, patience)
 
     def text(self, query):

@@ -73,6 +73,8 @@ class Outline:
         Of a place that says where it looks, in rad, or how far it reaches.
     extra : bool
         It repeats what other outlines draw (a hatch), and counts if its layer is given a role alone.
+    nonzero : bool
+        As SVG fills: where strokes of one direction overlap, it is filled, too.
     """
 
     strokes: tuple[Stroke, ...]
@@ -82,6 +84,7 @@ class Outline:
     heading: float | None = None
     radius: float | None = None
     extra: bool = False
+    nonzero: bool = False
 
     @property
     def hull(self) -> FloatArray:
@@ -140,6 +143,7 @@ def scaled(outlines: Sequence[Outline], by: float) -> list[Outline]:
             heading=outline.heading,
             radius=None if outline.radius is None else by * outline.radius,
             extra=outline.extra,
+            nonzero=outline.nonzero,
         )
         for outline in outlines
     ]

@@ -140,7 +140,16 @@ def _thick(points: FloatArray, half: float) -> Area:
 
 
 def _material(thing: Sequence[Ring]) -> Area:
-    return odd([filled(ring.points) for ring in thing])
+    """Return the walls that one outline draws; by the nonzero rule at least those, and never less."""
+    areas = [filled(ring.points) for ring in thing]
+    if not thing[0].nonzero:
+        return odd(areas)
+    turns = np.array([shapely.is_ccw(shapely.linearrings(ring.points)) for ring in thing])
+    tree = shapely.STRtree(areas)
+    first, second = tree.query(areas, predicate="intersects")
+    both = (first < second) & (turns[first] == turns[second])
+    overlaps = [areas[i].intersection(areas[k]) for i, k in zip(first[both], second[both], strict=True)]
+    return shapely.union_all([odd(areas), *overlaps])
 
 
 def _by_outline(rings: list[Ring]) -> list[list[Ring]]:

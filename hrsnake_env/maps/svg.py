@@ -281,6 +281,7 @@ def _outline(
             layer=layer or (own[0] if own else ""),
             names=own + names,
             colours=tuple(dict.fromkeys(colours)),
+            nonzero=is_filled and shape.values.get("fill-rule", "nonzero") == "nonzero",
         )
 
 

@@ -32,12 +32,15 @@ class Ring:
         See `roles.Roles`.
     outline : int
         Index of the outline it is drawn by, -1 if it was joined from lines.
+    nonzero : bool
+        Whether that outline is, see `drawing.Outline`.
     """
 
     points: FloatArray
     role: str | None
     key: str
     outline: int = -1
+    nonzero: bool = False
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -120,7 +123,8 @@ def traced(
             check_crossings(trace.points)
             found.take(trace)
             if _encloses(stroke, trace.points, gap):
-                found.rings.append(Ring(points=trace.points, role=role, key=key, outline=i))
+                ring = Ring(points=trace.points, role=role, key=key, outline=i, nonzero=outline.nonzero)
+                found.rings.append(ring)
             else:
                 loose.setdefault((role, key, outline.layer), []).append(trace.points)
     for (role, key, _), lines in loose.items():
