@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import contextlib
+import errno
 import http.client
 import io
 import json
@@ -554,6 +555,30 @@ def test_jobs_wait_in_order_and_those_that_cannot_are_refused(strict: Studio) ->
     third.close()
     _drop(second)
     strict.wait(lambda: not strict.jobs.waiting)
+
+
+def test_a_worker_that_never_gets_ready_is_said_to_those_who_wait() -> None:
+    running = Studio(Limits(jobs=1, warm_up_s=0.2))
+    try:
+        last = running.post("/api/plan", PLAN)[1][-1]
+    finally:
+        running.close()
+    assert (last["type"], last["kind"]) == ("error", "internal")
+    assert last["message"].startswith("No worker was ready after 0.2 s")
+
+
+def test_a_worker_that_cannot_be_started_is_said_to_those_who_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_: Limits) -> None:
+        raise OSError(errno.EAGAIN, "Resource temporarily unavailable")
+
+    monkeypatch.setattr("planners.studio.jobs.Worker", full)
+    monkeypatch.setattr("planners.studio.jobs.RETRY_S", 0.05)
+    running = Studio(Limits(jobs=1))
+    try:
+        last = running.post("/api/plan", PLAN)[1][-1]
+    finally:
+        running.close()
+    assert last["message"] == "No worker could be started: Resource temporarily unavailable."
 
 
 # Maps
