@@ -36,6 +36,7 @@ from planners.studio.motions import motion_from
 from planners.studio.requests import REQUESTS, read_request
 from planners.studio.running import listening_socket, server_on
 from planners.studio.scene import Scene, maze_from_scene, scene_from_maze
+from planners.studio.workers import Compiler
 
 JSON = {"Content-Type": "application/json"}
 SMALL = {  # a bend, which is planned in milliseconds
@@ -345,6 +346,18 @@ def test_a_body_that_drips_is_not_waited_for(strict: Studio) -> None:
         assert b" 408 " in sock.recv(4096)
 
 
+def test_a_client_that_is_refused_and_drips_does_not_hold_the_studio(strict: Studio) -> None:
+    with socket.create_connection(("127.0.0.1", strict.port)) as client:
+        client.sendall(b"POST /api/plan HTTP/1.1\r\nHost: evil.example\r\nContent-Length: 9000\r\n\r\n")
+        client.settimeout(0.1)
+        for _ in range(100):
+            with contextlib.suppress(TimeoutError):
+                assert client.recv(100).startswith(b"HTTP/1.1 421")
+                return
+            client.sendall(b"x")
+    raise AssertionError("no answer came while it dripped")
+
+
 def test_a_connection_that_asks_for_nothing_is_closed(strict: Studio) -> None:
     with socket.create_connection(("127.0.0.1", strict.port), timeout=20) as sock:
         sock.sendall(b"GET / HT")
@@ -565,6 +578,12 @@ def test_a_worker_that_never_gets_ready_is_said_to_those_who_wait() -> None:
         running.close()
     assert (last["type"], last["kind"]) == ("error", "internal")
     assert last["message"].startswith("No worker was ready after 0.2 s")
+
+
+def test_what_a_search_needs_is_compiled_by_a_process_that_ends() -> None:
+    compiler = Compiler()
+    compiler.process.join(300)
+    assert compiler.process.exitcode == 0
 
 
 def test_a_worker_that_cannot_be_started_is_said_to_those_who_wait(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,7 +24,7 @@ GIVE_UP = 3
 RETRY_S = 5.0
 """Seconds before the next one is started then."""
 
-COMPILE_S = 3.0
+COMPILE_S = 15.0
 """Seconds after the first worker is ready before what searches need is compiled, too."""
 
 

@@ -72,6 +72,7 @@ function replaceScene(scene, settings) {
 
 function setView(name) {
   if (root.dataset.view === name) return;
+  const left = byId(`${root.dataset.view}-view`).contains(document.activeElement); // the focus does not stay behind
   root.dataset.view = name;
   byId("draw-view").hidden = name !== "draw";
   byId("watch-view").hidden = name !== "watch";
@@ -81,6 +82,7 @@ function setView(name) {
     watch.close();
     view.resize();
   }
+  if (left) byId(name === "draw" ? "plan" : "player").focus({ preventScroll: true });
 }
 function watchRuns(chosen) {
   setView("watch");
