@@ -28,6 +28,7 @@ SOLVED = "document.documentElement.dataset.view === 'watch' && studio.watch.play
 ANSWERED = (
     "(document.querySelector('#outcomes .outcome') !== null || !document.getElementById('alert').hidden)"
 )
+OPEN = "document.documentElement?.dataset.ready === '1' && window.studio !== undefined"
 IDLE = "document.documentElement.dataset.busy === '0'"
 
 
@@ -490,9 +491,23 @@ def test_an_export_that_is_refused_says_why(studio):
 
 def test_a_closed_tab_loses_nothing(studio):
     page = studio()
-    page.evaluate("studio.store.change({ goal: [240, 640] })")
+    page.evaluate("studio.store.change({ goal: [240, 640] }), window.old = true")
     page.call("Page.reload")
-    page.wait("document.documentElement?.dataset.ready === '1' && window.studio?.store.scene.goal[1] === 640")
+    page.wait(f"{OPEN} && !window.old")
+    assert page.scene()["goal"] == [240, 640]
+
+
+def test_the_maze_in_the_address_is_opened_once(studio):
+    page = studio()
+    page.call("Page.navigate", url=page.allowed[0] + "?maze=fig17b")
+    page.wait(
+        "document.documentElement?.dataset.ready === '1' && window.studio?.store.scene.name === 'fig17b'"
+    )
+    page.evaluate("studio.store.change({ goal_radius: 7 })")
+    page.call("Page.reload")
+    page.wait(
+        "document.documentElement?.dataset.ready === '1' && window.studio?.store.scene.goal_radius === 7"
+    )
 
 
 # How it looks
@@ -548,7 +563,9 @@ Array.from(document.querySelectorAll('button, select, input:not([type=checkbox])
 def test_texts_and_fields_stand_out_from_their_ground(studio, dark):
     page = studio(dark=dark)
     ratios = page.evaluate(CONTRASTS)
-    assert {name: ratio for name, ratio in ratios.items() if ratio < (3.0 if name.startswith("rim") else 4.5)} == {}
+    assert {
+        name: ratio for name, ratio in ratios.items() if ratio < (3.0 if name.startswith("rim") else 4.5)
+    } == {}
 
 
 CONTRASTS = """
@@ -558,11 +575,12 @@ CONTRASTS = """
     const colour = values.getPropertyValue('--' + name).trim();
     const [r, g, b] = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16) / 255)
       .map((part) => (part <= 0.04045 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4));
-    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b + 0.05;
   };
-  const ratio = (a, b) => { const [dark, bright] = [light(a), light(b)].sort((x, y) => x - y); return (bright + 0.05) / (dark + 0.05); };
+  const ratio = (a, b) => Math.max(light(a) / light(b), light(b) / light(a));
   const pairs = [['on-accent', 'accent']];
-  for (const ground of ['card', 'page']) for (const text of ['ink', 'soft', 'accent', 'good', 'bad', 'rim']) pairs.push([text, ground]);
+  for (const ground of ['card', 'page'])
+    for (const text of ['ink', 'soft', 'accent', 'good', 'bad', 'rim']) pairs.push([text, ground]);
   return Object.fromEntries(pairs.map(([a, b]) => [a + ' on ' + b, ratio(a, b)]));
 })()
 """

@@ -231,10 +231,16 @@ def _compile() -> None:
         os.nice(19)
     parent = multiprocessing.parent_process()
     if parent is not None:
-        threading.Thread(target=lambda: (parent.join(), os._exit(0)), daemon=True).start()
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     from planners.studio import tasks
 
     tasks.warm_up_search()
+
+
+def _end_with(parent: Any) -> None:
+    """End this process when the server's has ended."""
+    parent.join()
+    os._exit(0)
 
 
 def _last_line(desk: Desk, kind: str, body: bytes, tasks: dict[str, Any]) -> bytes:

@@ -284,7 +284,10 @@ async function start() {
     fail(error instanceof ApiError ? error.message : String(error));
   }
   if (old) panel.set(old.settings);
-  if (about.start) await openMaze(about.start); // the one that the command line was given
+  // What the command line was given is opened once: a reload shows what has been drawn since.
+  const wanted = new URLSearchParams(location.search).get("maze") ?? (old ? null : about.start);
+  if (wanted) await openMaze(wanted);
+  history.replaceState(null, "", location.pathname);
   root.dataset.ready = "1";
 }
 function step(way) {
