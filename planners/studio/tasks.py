@@ -37,7 +37,7 @@ def warm_up() -> None:
 
 
 def warm_up_search() -> None:
-    """Look for a longest link for a moment, so that the rod bound and the search are compiled on this machine."""
+    """Look for a longest link for a moment: rod bound and search are compiled on this machine then."""
     bend = Maze.from_corridors([(0.0, 0.0), (0.0, 600.0), (600.0, 600.0)], 200.0)
     longest.longest_link(bend, accuracy=0.1, time_budget=0.1)
 
