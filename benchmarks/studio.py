@@ -1,4 +1,4 @@
-"""The studio, measured: start to first page, a plan over HTTP, many clients at once, and frames of the player.
+"""The studio, measured: start to first page, a plan over HTTP, many clients at once, frames of the player.
 
 Run with `.venv/bin/python benchmarks/studio.py` from the repository's root, on Linux. Prints a table. Frames
 are measured if there is a Chromium.

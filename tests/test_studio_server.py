@@ -36,7 +36,6 @@ from planners.studio.motions import motion_from
 from planners.studio.requests import REQUESTS, read_request
 from planners.studio.running import listening_socket, server_on
 from planners.studio.scene import Scene, maze_from_scene, scene_from_maze
-from planners.studio.workers import Compiler
 
 JSON = {"Content-Type": "application/json"}
 SMALL = {  # a bend, which is planned in milliseconds
@@ -578,12 +577,6 @@ def test_a_worker_that_never_gets_ready_is_said_to_those_who_wait() -> None:
         running.close()
     assert (last["type"], last["kind"]) == ("error", "internal")
     assert last["message"].startswith("No worker was ready after 0.2 s")
-
-
-def test_what_a_search_needs_is_compiled_by_a_process_that_ends() -> None:
-    compiler = Compiler()
-    compiler.process.join(300)
-    assert compiler.process.exitcode == 0
 
 
 def test_a_worker_that_cannot_be_started_is_said_to_those_who_wait(monkeypatch: pytest.MonkeyPatch) -> None:
