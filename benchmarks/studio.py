@@ -1,6 +1,7 @@
-"""The studio, measured: start to first page, a plan over HTTP, and many clients at once.
+"""The studio, measured: start to first page, a plan over HTTP, many clients at once, frames of the player.
 
-Run with `.venv/bin/python benchmarks/studio.py` from the repository's root, on Linux. Prints a table.
+Run with `.venv/bin/python benchmarks/studio.py` from the repository's root, on Linux. Prints a table. Frames
+are measured if there is a Chromium.
 """
 
 from __future__ import annotations
@@ -10,10 +11,12 @@ import contextlib
 import http.client
 import io
 import json
+import shutil
 import signal
 import statistics
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Iterator
@@ -24,7 +27,7 @@ import numpy as np
 
 from hrsnake_env.mazes import PAPER_LINK_LENGTHS
 
-STARTS, PLANS, CLIENTS, CROWD = 5, 15, 20, 60
+STARTS, PLANS, CLIENTS, CROWD, FRAMES_S = 5, 15, 20, 60, 8.0
 COMMAND = ["-c", "from planners.cli import main; main()", "studio", "--no-browser", "--port", "0"]
 LENGTHS = np.linspace(380.0, 436.0, CLIENTS)
 """One for each client, by which its answer is known."""
@@ -149,6 +152,31 @@ def first_pages() -> list[float]:
     return seconds
 
 
+def frame_times(port: int, maze: str) -> dict[str, Any] | None:
+    """Plan a maze from the page and play it: intervals of frames, and times to draw them, in ms."""
+    sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+    from browser import BROWSERS, Page, start_browser  # the tests' own
+
+    if not any(map(shutil.which, BROWSERS)):
+        return None
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        browser = start_browser(Path(folder))
+        try:
+            page = Page(browser, f"http://127.0.0.1:{port}/?maze={maze}", 1280, 800)
+            page.evaluate("document.getElementById('plan').click()")
+            page.wait("studio.watch.player !== null", 180.0)
+            time.sleep(FRAMES_S)  # it asks for nothing while it plays: that would cost frames
+            return dict(page.evaluate("studio.watch.player.frameTimes()"))
+        finally:
+            browser.close()
+
+
+def spread(values: list[float]) -> str:
+    """Return median and 95th percentile."""
+    middle, high = np.percentile(values, [50.0, 95.0])
+    return f"median {middle:.1f} ms, 95th percentile {high:.1f} ms"
+
+
 def main() -> None:
     """Measure and print."""
     pages = first_pages()
@@ -171,6 +199,11 @@ def main() -> None:
         status, last = planned(port, scene_of(port, "fig17a"), PAPER_LINK_LENGTHS["fig17a"])
         assert is_right(status, last, PAPER_LINK_LENGTHS["fig17a"]), last
         print(f"| fig17a, 245 px, the same | {time.perf_counter() - begin:.3f} s |", flush=True)
+        frames = frame_times(port, "fig17a")
+        for name, values in (frames or {}).items():
+            print(
+                f"| fig17a, 245 px, played: {name} of {len(values)} frames | {spread(values)} |", flush=True
+            )
         for n_clients in (CLIENTS, CROWD):
             found = crowd(port, scene, n_clients)
             print(

@@ -29,6 +29,7 @@ ANSWERED = (
     "(document.querySelector('#outcomes .outcome') !== null || !document.getElementById('alert').hidden)"
 )
 COMPILING = 240.0  # s: in a fresh checkout the first plan waits for the kernels to be compiled
+OPEN = "document.documentElement?.dataset.ready === '1' && window.studio !== undefined"
 IDLE = "document.documentElement.dataset.busy === '0'"
 
 
@@ -495,9 +496,23 @@ def test_an_export_that_is_refused_says_why(studio):
 
 def test_a_closed_tab_loses_nothing(studio):
     page = studio()
-    page.evaluate("studio.store.change({ goal: [240, 640] })")
+    page.evaluate("studio.store.change({ goal: [240, 640] }), window.old = true")
     page.call("Page.reload")
-    page.wait("document.documentElement?.dataset.ready === '1' && window.studio?.store.scene.goal[1] === 640")
+    page.wait(f"{OPEN} && !window.old")
+    assert page.scene()["goal"] == [240, 640]
+
+
+def test_the_maze_in_the_address_is_opened_once(studio):
+    page = studio()
+    page.call("Page.navigate", url=page.allowed[0] + "?maze=fig17b")
+    page.wait(
+        "document.documentElement?.dataset.ready === '1' && window.studio?.store.scene.name === 'fig17b'"
+    )
+    page.evaluate("studio.store.change({ goal_radius: 7 })")
+    page.call("Page.reload")
+    page.wait(
+        "document.documentElement?.dataset.ready === '1' && window.studio?.store.scene.goal_radius === 7"
+    )
 
 
 # How it looks
@@ -527,6 +542,83 @@ Array.from(document.querySelectorAll('button, input, select, canvas')).filter((p
   return box.width && (box.left < -1 || box.right > innerWidth + 1);
 }).map((part) => part.id || part.className)
 """
+
+
+def test_what_a_finger_is_to_hit_is_large_enough(studio):
+    page = studio(width=360, height=740, mobile=True)
+    page.evaluate("studio.editor.setTool('corridor')")
+    for view in ("draw", "open", "export", "watch"):
+        if view == "watch":
+            page.watch()
+        elif view != "draw":
+            page.evaluate(f"document.getElementById('{view}').click()")
+        assert page.evaluate(SMALL) == [], view
+        page.evaluate("document.querySelectorAll('dialog[open]').forEach((dialog) => dialog.close())")
+
+
+SMALL = """
+Array.from(document.querySelectorAll('button, select, input:not([type=checkbox])')).filter((part) => {
+  const box = part.getBoundingClientRect();
+  return box.width && (box.width < 43.5 || box.height < 43.5);
+}).map((part) => part.id || part.className || part.name)
+"""
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_texts_and_fields_stand_out_from_their_ground(studio, dark):
+    page = studio(dark=dark)
+    ratios = page.evaluate(CONTRASTS)
+    assert {
+        name: ratio for name, ratio in ratios.items() if ratio < (3.0 if name.startswith("rim") else 4.5)
+    } == {}
+
+
+CONTRASTS = """
+(() => {
+  const values = getComputedStyle(document.documentElement);
+  const light = (name) => {
+    const colour = values.getPropertyValue('--' + name).trim();
+    const [r, g, b] = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16) / 255)
+      .map((part) => (part <= 0.04045 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4));
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b + 0.05;
+  };
+  const ratio = (a, b) => Math.max(light(a) / light(b), light(b) / light(a));
+  const pairs = [['on-accent', 'accent']];
+  for (const ground of ['card', 'page'])
+    for (const text of ['ink', 'soft', 'accent', 'good', 'bad', 'rim']) pairs.push([text, ground]);
+  return Object.fromEntries(pairs.map(([a, b]) => [a + ' on ' + b, ratio(a, b)]));
+})()
+"""
+
+
+def test_the_focus_goes_where_the_view_goes(studio):
+    page = studio()
+    page.evaluate("document.getElementById('plan').focus()")
+    page.key("Enter")
+    page.wait(SOLVED)
+    assert page.evaluate("document.activeElement.id") == "player"
+    assert page.evaluate("document.activeElement.getAttribute('aria-label')").startswith("u-turn, 6 links")
+    page.key("Escape")
+    assert page.evaluate("document.activeElement.id") == "plan"
+
+
+def test_a_view_that_is_moved_shows_what_is_drawn_there(studio):
+    page = studio()
+    page.frames()
+    page.evaluate("studio.view.panBy(3, -2)")
+    page.frames()  # now there is a margin
+    page.evaluate("window.drawn = studio.view.drawn")
+    for by in (17, 23, -60):
+        page.evaluate(f"studio.view.panBy({by}, {-by // 2})")
+        page.frames()
+    assert page.evaluate("window.drawn === studio.view.drawn")  # nothing was drawn anew
+    moved = page.evaluate("studio.editor.canvas.toDataURL()")
+    page.evaluate("studio.view.drawn = { key: '' }, studio.view.redraw()")
+    page.frames()
+    assert page.evaluate("studio.editor.canvas.toDataURL()") == moved
+    page.evaluate("studio.view.panBy(5000, 0), studio.view.redraw()")
+    page.frames()
+    assert page.evaluate("window.drawn !== studio.view.drawn")
 
 
 def test_every_control_has_a_name(studio):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import contextlib
+import errno
 import http.client
 import io
 import json
@@ -344,6 +345,18 @@ def test_a_body_that_drips_is_not_waited_for(strict: Studio) -> None:
         assert b" 408 " in sock.recv(4096)
 
 
+def test_a_client_that_is_refused_and_drips_does_not_hold_the_studio(strict: Studio) -> None:
+    with socket.create_connection(("127.0.0.1", strict.port)) as client:
+        client.sendall(b"POST /api/plan HTTP/1.1\r\nHost: evil.example\r\nContent-Length: 9000\r\n\r\n")
+        client.settimeout(0.1)
+        for _ in range(100):
+            with contextlib.suppress(TimeoutError):
+                assert client.recv(100).startswith(b"HTTP/1.1 421")
+                return
+            client.sendall(b"x")
+    raise AssertionError("no answer came while it dripped")
+
+
 def test_a_connection_that_asks_for_nothing_is_closed(strict: Studio) -> None:
     with socket.create_connection(("127.0.0.1", strict.port), timeout=20) as sock:
         sock.sendall(b"GET / HT")
@@ -554,6 +567,30 @@ def test_jobs_wait_in_order_and_those_that_cannot_are_refused(strict: Studio) ->
     third.close()
     _drop(second)
     strict.wait(lambda: not strict.jobs.waiting)
+
+
+def test_a_worker_that_never_gets_ready_is_said_to_those_who_wait() -> None:
+    running = Studio(Limits(jobs=1, warm_up_s=0.2))
+    try:
+        last = running.post("/api/plan", PLAN)[1][-1]
+    finally:
+        running.close()
+    assert (last["type"], last["kind"]) == ("error", "internal")
+    assert last["message"].startswith("No worker was ready after 0.2 s")
+
+
+def test_a_worker_that_cannot_be_started_is_said_to_those_who_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_: Limits) -> None:
+        raise OSError(errno.EAGAIN, "Resource temporarily unavailable")
+
+    monkeypatch.setattr("planners.studio.jobs.Worker", full)
+    monkeypatch.setattr("planners.studio.jobs.RETRY_S", 0.05)
+    running = Studio(Limits(jobs=1))
+    try:
+        last = running.post("/api/plan", PLAN)[1][-1]
+    finally:
+        running.close()
+    assert last["message"] == "No worker could be started: Resource temporarily unavailable."
 
 
 # Maps

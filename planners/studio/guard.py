@@ -195,11 +195,12 @@ async def _drain(receive: Receive, limits: Limits) -> None:
     """Let go by what a client sends while it sends, within limits: many hear an answer only after that."""
     left = limits.body_bytes
     with contextlib.suppress(TimeoutError):
-        while left > 0:
-            message = await asyncio.wait_for(receive(), DRAIN_S)
-            left -= len(message.get("body", b""))
-            if not message.get("more_body", False):
-                return
+        async with asyncio.timeout(limits.body_idle_s):  # for one that drips, too
+            while left > 0:
+                message = await asyncio.wait_for(receive(), DRAIN_S)
+                left -= len(message.get("body", b""))
+                if not message.get("more_body", False):
+                    return
 
 
 class Shelf:

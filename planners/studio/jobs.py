@@ -11,7 +11,7 @@ from collections.abc import AsyncIterator
 from typing import Any
 
 from planners.studio.limits import Limits
-from planners.studio.workers import PROGRESS, READY, STOP, Worker, error_line, line_of
+from planners.studio.workers import PROGRESS, READY, STOP, Compiler, Worker, error_line, line_of
 
 __all__ = ["Busy", "Job", "Jobs"]
 
@@ -23,6 +23,9 @@ GIVE_UP = 3
 
 RETRY_S = 5.0
 """Seconds before the next one is started then."""
+
+COMPILE_S = 15.0
+"""Seconds after the first worker is ready before what searches need is compiled, too."""
 
 
 class Busy(Exception):
@@ -112,6 +115,7 @@ class Jobs:
         self.slots = [_Slot() for _ in range(limits.jobs)]
         self.closed = False
         self._failures = 0
+        self._compiler: Compiler | None = None
         self._tasks: set[asyncio.Task[Any]] = set()
 
     # Asked by the server
@@ -134,8 +138,8 @@ class Jobs:
         await self._kill_all()  # those that were only just started, too
 
     async def _kill_all(self) -> None:
-        workers = [slot.worker for slot in self.slots if slot.worker is not None]
-        await asyncio.gather(*(asyncio.to_thread(worker.kill) for worker in workers))
+        workers = [self._compiler, *(slot.worker for slot in self.slots)]
+        await asyncio.gather(*(asyncio.to_thread(worker.kill) for worker in workers if worker is not None))
 
     def submit(self, kind: str, body: bytes, time_limit: float) -> Job:
         """Put a job at the end of the queue.
@@ -239,6 +243,8 @@ class Jobs:
             self._on_death(slot)
         elif message == READY:
             slot.ready, self._failures = True, 0
+            if self._compiler is None:
+                self._loop.call_later(COMPILE_S, self._compile)
             for other in self.slots:
                 if other.worker is None:
                     self._replace(other)
@@ -261,11 +267,35 @@ class Jobs:
             self._failures += 1
         if self._failures < GIVE_UP:
             self._replace(slot)
-            return
-        for job in self.waiting:
-            job.end(error_line("internal", "No worker could be started; the terminal says more."))
-        self.waiting.clear()
-        self._loop.call_later(RETRY_S, self._replace, slot)
+        else:
+            self._give_up(slot, "No worker could be started; the terminal says more.")
+
+    def _give_up(self, slot: _Slot, why: str) -> None:
+        """Start another worker in a while; those that wait hear why, unless another one works."""
+        if not any(other.ready for other in self.slots):
+            for job in self.waiting:
+                job.end(error_line("internal", why))
+            self.waiting.clear()
+        self._loop.call_later(RETRY_S, self._retry, slot)
+
+    def _retry(self, slot: _Slot) -> None:
+        if not slot.ready:
+            self._replace(slot)
+
+    def _not_ready(self, slot: _Slot, worker: Worker) -> None:
+        if slot.worker is worker and not slot.ready and not self.closed:
+            seconds = self.limits.warm_up_s
+            self._give_up(slot, f"No worker was ready after {seconds:g} s; the terminal may say more.")
+
+    def _compile(self) -> None:
+        """Let a process of low priority compile what the first search would wait for."""
+
+        async def compiled() -> None:
+            with contextlib.suppress(OSError):  # then the first search compiles
+                self._compiler = await asyncio.to_thread(Compiler)
+
+        if self._compiler is None and not self.closed:
+            self._run(compiled())
 
     def _replace(self, slot: _Slot) -> None:
         """End the worker in this place, if there is one, and start another."""
@@ -277,8 +307,14 @@ class Jobs:
         async def replace() -> None:
             if old is not None:
                 await asyncio.to_thread(old.kill)
-            new = slot.worker = await asyncio.to_thread(Worker, self.limits)
-            slot.starting = False
+            try:
+                new = await asyncio.to_thread(Worker, self.limits)
+            except OSError as error:  # the system has no more processes, memory or files
+                slot.starting = False
+                self._give_up(slot, f"No worker could be started: {error.strerror or error}.")
+                return
+            slot.worker, slot.starting = new, False
+            self._loop.call_later(self.limits.warm_up_s, self._not_ready, slot, new)
             threading.Thread(target=self._read, args=(slot, new), daemon=True).start()
 
         self._run(replace())

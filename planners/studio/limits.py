@@ -24,6 +24,8 @@ class Limits:
         Seconds that planning may be given.
     grace_s : float
         Seconds after which a job is ended that has not ended by itself when its time was over.
+    warm_up_s : float
+        Seconds that a worker may take until it can work; the first one compiles.
     longest_s : float
         Seconds after which a search for the longest link ends with the best so far.
     body_bytes : int
@@ -48,6 +50,7 @@ class Limits:
     queue: int = 32
     time_budget_s: float = 60.0
     grace_s: float = 30.0
+    warm_up_s: float = 300.0
     longest_s: float = 900.0
     body_bytes: int = 32 * MIB
     held_bytes: int = 160 * MIB

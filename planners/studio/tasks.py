@@ -23,7 +23,7 @@ from planners.validation import validate
 if TYPE_CHECKING:
     from planners.studio.workers import Desk
 
-__all__ = ["TASKS", "warm_up"]
+__all__ = ["TASKS", "warm_up", "warm_up_search"]
 
 
 def warm_up() -> None:
@@ -34,6 +34,12 @@ def warm_up() -> None:
     result = plan(maze, ArmSpec(link_length=430.0))
     if result.motion is not None:
         simulate_motion(result.motion, maze)
+
+
+def warm_up_search() -> None:
+    """Look for a longest link for a moment: rod bound and search are compiled on this machine then."""
+    bend = Maze.from_corridors([(0.0, 0.0), (0.0, 600.0), (600.0, 600.0)], 200.0)
+    longest.longest_link(bend, accuracy=0.1, time_budget=0.1)
 
 
 def plan_task(ask: PlanRequest, desk: Desk) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from hrsnake_env.errors import InputError
 from planners.studio.limits import Limits
 from planners.studio.requests import read_request
 
-__all__ = ["PROGRESS", "READY", "STOP", "Desk", "Worker", "error_line", "line_of"]
+__all__ = ["PROGRESS", "READY", "STOP", "Compiler", "Desk", "Worker", "error_line", "line_of"]
 
 READY = b"ready"
 """What a worker sends when it can work at full speed."""
@@ -119,6 +119,21 @@ class Worker:
         self.process.join()
 
 
+class Compiler:
+    """Hold a process that compiles what a search for the longest link needs, for all workers, and ends."""
+
+    def __init__(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.process = context.Process(target=_compile, name="hrsnake-studio-compiler", daemon=True)
+        with _starting, _few_threads():
+            self.process.start()
+
+    def kill(self) -> None:
+        """End the process at once."""
+        self.process.kill()
+        self.process.join()
+
+
 @contextmanager
 def _few_threads() -> Iterator[None]:
     """Let processes that start here use one thread for linear algebra each: memory and cores are shared."""
@@ -207,6 +222,25 @@ def _work(connection: Connection, worker_bytes: int) -> None:
     while True:
         kind, body = desk.next_job()
         connection.send_bytes(_last_line(desk, kind, body, tasks.TASKS))
+
+
+def _compile() -> None:
+    """Compile for the disk, whenever nobody else needs the processor."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(os, "nice"):
+        os.nice(19)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    from planners.studio import tasks
+
+    tasks.warm_up_search()
+
+
+def _end_with(parent: Any) -> None:
+    """End this process when the server's has ended."""
+    parent.join()
+    os._exit(0)
 
 
 def _last_line(desk: Desk, kind: str, body: bytes, tasks: dict[str, Any]) -> bytes:

@@ -72,6 +72,7 @@ function replaceScene(scene, settings) {
 
 function setView(name) {
   if (root.dataset.view === name) return;
+  const left = byId(`${root.dataset.view}-view`).contains(document.activeElement); // the focus does not stay behind
   root.dataset.view = name;
   byId("draw-view").hidden = name !== "draw";
   byId("watch-view").hidden = name !== "watch";
@@ -81,6 +82,7 @@ function setView(name) {
     watch.close();
     view.resize();
   }
+  if (left) byId(name === "draw" ? "plan" : "player").focus({ preventScroll: true });
 }
 function watchRuns(chosen) {
   setView("watch");
@@ -282,7 +284,10 @@ async function start() {
     fail(error instanceof ApiError ? error.message : String(error));
   }
   if (old) panel.set(old.settings);
-  if (about.start) await openMaze(about.start); // the one that the command line was given
+  // What the command line was given is opened once: a reload shows what has been drawn since.
+  const wanted = new URLSearchParams(location.search).get("maze") ?? (old ? null : about.start);
+  if (wanted) await openMaze(wanted);
+  history.replaceState(null, "", location.pathname);
   root.dataset.ready = "1";
 }
 function step(way) {

@@ -14,14 +14,15 @@ export function numberText(value, digits = 6) {
   return String(Number(value.toPrecision(digits))).replace("-", "\u2212");
 }
 
+const MARGIN = 0.25; // of the canvas, on each side
+
 export class View {
   constructor(canvas) {
     Object.assign(this, { canvas, x: 0, y: 0, scale: 1, width: 1, height: 1, ratio: 1, awaited: false, painters: [] });
-    this.mask = document.createElement("canvas");
-    this.tinted = document.createElement("canvas");
+    [this.kept, this.mask, this.tinted] = ["kept", "mask", "tinted"].map(() => document.createElement("canvas"));
     this.origin = [0, 0];
     this.scene = null;
-    this.drawn = ""; // what the mask holds
+    this.drawn = { key: "" }; // what `kept` shows: walls and free space, with some margin while the view is moved
     this.drawTimes = [];
   }
 
@@ -39,11 +40,8 @@ export class View {
     const first = this.width === 1;
     this.ratio = window.devicePixelRatio || 1;
     Object.assign(this, { width: box.width, height: box.height });
-    for (const canvas of [this.canvas, this.mask, this.tinted]) {
-      canvas.width = Math.round(box.width * this.ratio);
-      canvas.height = Math.round(box.height * this.ratio);
-    }
-    this.drawn = "";
+    this.canvas.width = Math.round(box.width * this.ratio);
+    this.canvas.height = Math.round(box.height * this.ratio);
     this.redraw();
     return first;
   }
@@ -94,15 +92,9 @@ export class View {
   draw() {
     const began = performance.now();
     const context = this.canvas.getContext("2d");
-    this.drawMask();
+    this.keep();
     context.setTransform(1, 0, 0, 1, 0, 0);
-    context.fillStyle = colours.wall;
-    context.fillRect(0, 0, this.canvas.width, this.canvas.height);
-    this.tint(colours.edge);
-    const by = Math.max(1, this.ratio);
-    for (const [dx, dy] of [[by, 0], [-by, 0], [0, by], [0, -by], [by, by], [-by, by], [by, -by], [-by, -by]]) context.drawImage(this.tinted, dx, dy);
-    this.tint(colours.free);
-    context.drawImage(this.tinted, 0, 0);
+    context.drawImage(this.kept, ...this.keptAt());
     context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
     this.drawGrid(context);
     for (const painter of this.painters) painter(context, this);
@@ -111,18 +103,42 @@ export class View {
     if (this.drawTimes.length > 300) this.drawTimes.shift();
   }
 
+  /** Where on the canvas `kept` belongs, in whole pixels: between them it would blur. */
+  keptAt() {
+    const { canvas, kept, drawn, x, y } = this, s = this.scale * this.ratio;
+    return [(canvas.width - kept.width) / 2 + (drawn.x - x) * s, (canvas.height - kept.height) / 2 - (drawn.y - y) * s].map(Math.round);
+  }
+  /** Draw walls and free space, unless that has been done: a view that is only moved finds them drawn. */
+  keep() {
+    const { canvas, kept, scene, x, y, drawn } = this;
+    const key = [this.scale, this.ratio, canvas.width, canvas.height, colours.wall, colours.edge, colours.free].join();
+    const same = key === drawn.key && scene.shapes === drawn.shapes;
+    if (same) {
+      const [left, top] = this.keptAt();
+      if (x === drawn.x && y === drawn.y) return;
+      if (left <= 0 && top <= 0 && left + kept.width >= canvas.width && top + kept.height >= canvas.height) return;
+    }
+    this.drawn = { key, shapes: scene.shapes, x, y };
+    for (const one of [kept, this.mask, this.tinted]) { // even differences: whole pixels on either side
+      one.width = canvas.width + (same ? 2 * Math.round(MARGIN * canvas.width) : 0);
+      one.height = canvas.height + (same ? 2 * Math.round(MARGIN * canvas.height) : 0);
+    }
+    this.drawMask();
+    const context = kept.getContext("2d");
+    context.fillStyle = colours.wall;
+    context.fillRect(0, 0, kept.width, kept.height);
+    this.tint(colours.edge);
+    const by = Math.max(1, this.ratio);
+    for (const [dx, dy] of [[by, 0], [-by, 0], [0, by], [0, -by], [by, by], [-by, by], [by, -by], [-by, -by]]) context.drawImage(this.tinted, dx, dy);
+    this.tint(colours.free);
+    context.drawImage(this.tinted, 0, 0);
+  }
+
   /** Fold the shapes as the planner does: free adds to the free space, a wall takes away from it. */
   drawMask() {
-    const { mask, scene, x, y, scale, ratio } = this;
-    const key = [x, y, scale, mask.width, mask.height].join();
-    if (key === this.drawn && this.maskOf === scene.shapes) return;
-    this.drawn = key;
-    this.maskOf = scene.shapes;
-    const context = mask.getContext("2d");
-    context.setTransform(1, 0, 0, 1, 0, 0);
-    context.globalCompositeOperation = "source-over";
-    context.clearRect(0, 0, mask.width, mask.height);
-    this.setWorld(context, ratio);
+    const { mask, canvas, scene, scale, ratio } = this, context = mask.getContext("2d"), s = scale * ratio;
+    const [left, top] = this.toScreen(...this.origin);
+    context.setTransform(s, 0, 0, -s, left * ratio + (mask.width - canvas.width) / 2, top * ratio + (mask.height - canvas.height) / 2);
     for (const shape of scene.shapes) {
       context.globalCompositeOperation = shape.role === "free" ? "source-over" : "destination-out";
       const path = pathOf(shape, this.origin);

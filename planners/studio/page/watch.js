@@ -21,6 +21,7 @@ export class Watch {
     byId("stale").hidden = !old;
     byId("stale").textContent = old === runs.length ? "The drawing has changed since." : "The drawing has changed since one of them.";
     this.close();
+    byId("player").setAttribute("aria-label", runs.map((run) => run.title).join(", beside "));
     const payload = { ...runs[0].payload, traces: runs.map((run) => ({ ...run.payload.traces[0], title: run.title })) };
     try {
       const steps = new Set(runs.map((run) => run.payload.timestep));
