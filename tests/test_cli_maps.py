@@ -47,7 +47,7 @@ def run(capsys, monkeypatch):
 def test_a_map_becomes_a_maze_that_can_be_planned_in(run):
     code, out, err = run("ros_house.yaml", *ENDS, "--out", "m.geojson", "--picture", "m.png")
     assert (code, err) == (0, "")
-    for text in ("ROS map, mode trinary", "PPM image of 96 x 64 pixels", "4.3 x 2.7 m", "straight way"):
+    for text in ("ROS map, mode trinary", "PGM image of 96 x 64 pixels", "4.3 x 2.7 m", "straight way"):
         assert text in out
     for name in ("m.geojson", "m.png"):
         assert f"Written: {name}" in out and Path(name).stat().st_size > 1000

@@ -170,7 +170,8 @@ def decoded(data: bytes, name: str) -> Pixels:
 def _pixels(image: Image.Image, name: str) -> Pixels:
     frames = getattr(image, "n_frames", 1)
     notes = [f"Of {frames} pictures in the file, the first was read."] if frames > 1 else []
-    kind = image.format
+    # Pillow has one name for all of these; grey ones are PGM files.
+    kind = "PGM" if image.format == "PPM" and image.mode[0] in "1LI" else image.format
     image = ImageOps.exif_transpose(image)
     notes.insert(0, f"{kind} image of {image.width} x {image.height} pixels.")
     if image.mode == "F":
