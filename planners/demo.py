@@ -93,7 +93,8 @@ def run_demo(folder: Path, progress: Progress | None = None) -> Demo:
     maze, arm = Maze.load("fig19"), ArmSpec(link_length=LINK_LENGTH)
     tell = progress if progress is not None else lambda stage, share: None
     tell("compile", 0.0)
-    plan(maze, arm, PLANNER)  # the first plan on a machine compiles the kernels and would hide their times
+    for planner in (PLANNER, "auto"):  # the first plans on a machine compile kernels, which would hide times
+        plan(maze, arm, planner)
     tell("compile", 1.0)
     result = plan(maze, arm, PLANNER, progress=progress)
     if result.motion is None:
