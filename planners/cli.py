@@ -92,8 +92,8 @@ def plan_command(
 ) -> None:
     """Plan a motion from the feeder to the goal, and check it exactly.
 
-    Without a plan (exit code 3) it says where the arm stopped, which wall is in the way, and how long a link
-    would pass there; --picture shows it.
+    Without a plan (exit code 3) it says where the arm stopped, which wall is in the way, and a length with
+    which the sweep gets past it; --picture shows it.
     """
     check_output(out, (".npz",))
     check_output(picture, PICTURES)
@@ -128,7 +128,8 @@ def longest_command(
         str, typer.Option("--lengths", help="Further lengths for the table, as 100,200,300.")
     ] = "",
     accuracy: Annotated[
-        float, typer.Option("--accuracy", help="Step of the lengths, as a share.")
+        float,
+        typer.Option("--accuracy", help="Step of the lengths that are tried, as a share of the length."),
     ] = longest.ACCURACY,
     time_budget: Annotated[
         float, typer.Option("--time-budget", help="Seconds that planning may take for each length.")
@@ -145,8 +146,8 @@ def longest_command(
 ) -> None:
     """Find the longest link that reaches the goal, and how few links it takes. Ctrl-C: so far.
 
-    The table says what shorter links need, too: their number, the range of their joints, the clearance that
-    is left. --state lets the same command go on where it was stopped.
+    The table says what shorter links need, too: their number, and the range and the speed of their joints.
+    --state lets the same command go on where it was stopped.
     """
     check_output(out)
     check_output(plot, PICTURES)
@@ -348,9 +349,9 @@ for _panel, _name, _command, _examples in (
         "import",
         import_command,
         [
-            "hrsnake import duct.yaml --picture duct.png",
-            "hrsnake import duct.yaml --base 0.1,0.5,0 --goal 10,0.5 --out duct.geojson",
-            "hrsnake import casing.svg --units mm --walls vanes --out casing.geojson",
+            "hrsnake import docs/maps/duct.yaml --picture duct.png",
+            "hrsnake import docs/maps/duct.yaml --base 0.1,0.5,0 --goal 10,0.5 --out duct.geojson",
+            "hrsnake import docs/maps/channel.dxf --walls PILLARS --base-layer BASE --goal-layer GOAL",
         ],
     ),
     (

@@ -44,9 +44,11 @@ __all__ = ["export_command"]
 
 def export_command(
     maze: Annotated[
-        str, typer.Argument(metavar="MAZE", help="A name or a file, as of plan or spatial plan.")
+        str, typer.Argument(metavar="MAZE", help="A name or a file, as for plan or spatial plan.")
     ],
-    motion: Annotated[Path, typer.Argument(metavar="MOTION", help="A motion (.npz) in it.")],
+    motion: Annotated[
+        Path, typer.Argument(metavar="MOTION", help="A motion (.npz) in it, as plan writes it.")
+    ],
     out: Annotated[
         Path,
         typer.Option(
@@ -55,7 +57,9 @@ def export_command(
             ".urdf, .gif, .mp4, .html.",
         ),
     ],
-    format: Annotated[str | None, typer.Option("--format", help=f"{', '.join(EXPORTS)}.")] = None,
+    format: Annotated[
+        str | None, typer.Option("--format", help=f"By default as --out ends; else {', '.join(EXPORTS)}.")
+    ] = None,
     rate: Annotated[float, typer.Option("--rate", help="Samples per second.")] = DEFAULT_RATE,
     joint_speed: Annotated[float, typer.Option("--joint-speed", help="Largest, in degrees per s.")] = 90.0,
     joint_acceleration: Annotated[
@@ -82,8 +86,8 @@ def export_command(
 ) -> None:
     """Write a motion as a trajectory within limits of speed and acceleration, checked as the motion is.
 
-    `hrsnake export fig19 fig19.npz --out arm.csv` writes a table, `--out arm.yaml --metres-per-unit 0.001` a
-    ROS 2 trajectory_msgs/msg/JointTrajectory, `--out arm.urdf` the arm, `--out arm.mp4` a video.
+    --out arm.csv writes a table, --out arm.yaml a ROS 2 trajectory_msgs/msg/JointTrajectory, --out arm.urdf
+    the arm, --out arm.mp4 a video. --link-radius and --joint-limit are the arm's: give them as to plan.
     """
     name = format_for(out, format)
     check_output(out, (EXPORTS[name].ending, ".yml") if name == "ros2-yaml" else (EXPORTS[name].ending,))

@@ -156,13 +156,10 @@ def import_command(
 ) -> None:
     """Make a maze of a map: ROS, image, SVG, DXF or GeoJSON. The free space never grows.
 
-    First look:  hrsnake import plan.png --picture seen.png
+    First look at what is understood (--picture); then say where the arm comes in (--base) and where its tip
+    shall go (--goal), unless the map says it, and write the maze (--out).
 
-    Then say where:  hrsnake import plan.png --base 20,40,90 --goal 300,120 --out plan.geojson
-
-    A ROS map in mm:  hrsnake import map.yaml --units mm --base 500,500,0 --goal 4000,2500 --out map.geojson
-
-    A CAD drawing:  hrsnake import duct.dxf --walls WALLS --base-layer BASE --goal-layer GOAL --out d.geojson
+    A ROS map, read in mm:  hrsnake import map.yaml --units mm --picture seen.png
     """
     check_output(out, (".geojson", ".json"))
     check_output(picture, PICTURES)

@@ -19,6 +19,7 @@ from planners.cli_tools import (
     RadiusOption,
     check_folder,
     check_output,
+    examples,
     name_of,
     one_bar,
     print_outcome,
@@ -46,7 +47,10 @@ PageOption = Annotated[Path | None, typer.Option("--page", help="Write a page th
 MotionOption = Annotated[Path | None, typer.Option("--out", help="Write the motion (.npz).")]
 
 
-@spatial_app.command("plan")
+@spatial_app.command(
+    "plan",
+    epilog=examples(["hrsnake spatial plan paired-panels --link-length 90 --out m3.npz --page m3.html"]),
+)
 def plan_command(
     workspace: WorkspaceArgument,
     link_length: Annotated[float, typer.Option("--link-length", help="In workspace units.")],
@@ -95,7 +99,7 @@ def plan_command(
         raise typer.Exit(NOT_CLEAN)
 
 
-@spatial_app.command("validate")
+@spatial_app.command("validate", epilog=examples(["hrsnake spatial validate paired-panels m3.npz"]))
 def validate_command(
     workspace: WorkspaceArgument,
     motion: Annotated[Path, typer.Argument(metavar="MOTION", help="A motion in space (.npz).")],
@@ -115,13 +119,15 @@ def validate_command(
         raise typer.Exit(NOT_CLEAN)
 
 
-@spatial_app.command("longest")
+@spatial_app.command("longest", epilog=examples(["hrsnake spatial longest paired-panels --accuracy 0.01"]))
 def longest_command(
     workspace: WorkspaceArgument,
     planner: PlannerOption = "auto",
     link_radius: RadiusOption = 0.0,
     joint_limit: LimitOption = None,
-    accuracy: Annotated[float, typer.Option("--accuracy", help="As a share of the length.")] = 1e-3,
+    accuracy: Annotated[
+        float, typer.Option("--accuracy", help="How close to get to the longest, as a share.")
+    ] = 1e-3,
     time_budget: Annotated[
         float, typer.Option("--time-budget", help="Seconds that planning may take for each length.")
     ] = 30.0,
@@ -155,7 +161,7 @@ def longest_command(
         raise typer.Exit(NOT_CLEAN)
 
 
-@spatial_app.command("draw")
+@spatial_app.command("draw", epilog=examples(["hrsnake spatial draw paired-panels m3.npz --out m3.png"]))
 def draw_command(
     workspace: WorkspaceArgument,
     motion: Annotated[Path, typer.Argument(metavar="MOTION", help="A motion in space (.npz).")],
@@ -178,7 +184,7 @@ def draw_command(
     )
 
 
-@spatial_app.command("save")
+@spatial_app.command("save", epilog=examples(["hrsnake spatial save random-7 room.json"]))
 def save_command(
     workspace: WorkspaceArgument,
     out: Annotated[Path, typer.Argument(metavar="FILE", help="A new workspace file (.json).")],
@@ -189,7 +195,7 @@ def save_command(
     print(f"Written: {out}")
 
 
-@spatial_app.command("figures")
+@spatial_app.command("figures", epilog=examples(["hrsnake spatial figures --out figures"]))
 def figures_command(
     out: Annotated[Path, typer.Option("--out", help="Folder; made if missing.")] = Path("spatial-figures"),
     as_json: JsonOption = False,

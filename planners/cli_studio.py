@@ -32,7 +32,7 @@ def studio_command(
     jobs: Annotated[int, typer.Option("--jobs", help="Plans at once, each in a process of its own.")] = 2,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
     time_limit: Annotated[
-        float, typer.Option("--time-limit", help="Seconds that planning may be given, at most.")
+        float, typer.Option("--time-limit", help="Most seconds that the page may give to a plan.")
     ] = 60.0,
 ) -> None:
     """Draw mazes, plan, watch and export on a page in the browser. Ctrl-C ends it."""

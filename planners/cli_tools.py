@@ -60,13 +60,19 @@ def planners_named(incomplete: str) -> list[str]:
 
 MAZE_HELP = f"A .geojson file, or one of: {', '.join(MAZES)}."
 MazeArgument = Annotated[str, typer.Argument(metavar="MAZE", help=MAZE_HELP, autocompletion=mazes_named)]
-MotionArgument = Annotated[Path, typer.Argument(metavar="MOTION", help="A motion (.npz).")]
+MotionArgument = Annotated[Path, typer.Argument(metavar="MOTION", help="A motion (.npz), as plan writes it.")]
 PlannerOption = Annotated[
     str, typer.Option("--planner", help=f"auto, {', '.join(PLANNERS)}.", autocompletion=planners_named)
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of tables.")]
-RadiusOption = Annotated[float, typer.Option("--link-radius", help="Radius of the links, in the same units.")]
-LimitOption = Annotated[float | None, typer.Option("--joint-limit", help="Largest joint angle, in degrees.")]
+RadiusOption = Annotated[
+    float,
+    typer.Option("--link-radius", help="Half the thickness of the links, in units of the maze or workspace."),
+]
+LimitOption = Annotated[
+    float | None,
+    typer.Option("--joint-limit", help="Largest joint angle, in degrees. By default there is none."),
+]
 
 
 def examples(lines: Sequence[str]) -> str:
