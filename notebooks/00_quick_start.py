@@ -143,7 +143,9 @@ print(f"longest {longest.length:.1f} mm, index I = {longest.index_text}")
 print(f"no rod longer than {longest.bound.upper:.1f} mm passes")
 
 # %% [markdown]
-# ## The same without Python
+# ## Without Python
+#
+# The same steps in one of the named mazes, as commands:
 #
 #     hrsnake plan fig19 --link-length 430 --out m.npz --picture m.png
 #     hrsnake validate fig19 m.npz

@@ -167,7 +167,8 @@ for name in ("feed", "joint_0", "joint_17"):
 #
 #     hrsnake import plant.yaml --base 0.5,0.1,90 --goal 7.5,0.6 --goal-radius 0.1 --out plant.geojson
 #     hrsnake plan plant.geojson --link-length 1.2 --link-radius 0.05 --out m.npz
-#     hrsnake export plant.geojson m.npz --link-radius 0.05 --joint-speed 30 --feed-speed 0.25 --out arm.yaml
+#     hrsnake export plant.geojson m.npz --link-radius 0.05 --joint-speed 30 --joint-acceleration 90 \
+#         --feed-speed 0.25 --feed-acceleration 0.5 --out arm.yaml
 #
 # A drawing does as well: `read_map("plan.svg")` or `.dxf` takes closed outlines as free space and what is in
 # them as walls, or layers by name (`MapOptions(walls=("WALLS",), base=("BASE",))`). `hrsnake studio` is a
