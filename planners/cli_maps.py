@@ -329,4 +329,5 @@ def _next_command(source: str, reading: MapReading, maze: Maze | None, out: Path
         length = float(f"{SHARE * _straight_way(maze):.2g}")
         return f"hrsnake plan {shlex.quote(str(out))} --link-length {length:g}"
     wanted = f"{shlex.quote(Path(source).stem)}.geojson"
-    return f"hrsnake import {shlex.quote(source)} ... --base X,Y,DEG --goal X,Y --out {wanted}"
+    places = "" if maze is not None else "--base X,Y,DEG --goal X,Y "
+    return f"the same command with {places}--out {wanted}"

@@ -56,13 +56,16 @@ def test_a_map_becomes_a_maze_that_can_be_planned_in(run):
     assert plan(Maze.load("m.geojson"), ArmSpec(link_length=length)).solved
 
 
+def test_a_map_that_says_both_ends_only_lacks_a_name_for_the_maze(run):
+    code, out, err = run("ros_house.yaml", *ENDS)
+    assert (code, err) == (0, "") and "Next: the same command with --out ros_house.geojson" in out
+
+
 def test_without_base_and_goal_the_map_is_shown_all_the_same(run):
     code, out, err = run("image_house.png", "--picture", "m.png")
     assert (code, err) == (0, "") and Path("m.png").stat().st_size > 1000
     assert "not said: give --base X,Y,DEG" in out and "not said: give --goal X,Y" in out
-    assert (
-        "Next: hrsnake import image_house.png ... --base X,Y,DEG --goal X,Y --out image_house.geojson" in out
-    )
+    assert "Next: the same command with --base X,Y,DEG --goal X,Y --out image_house.geojson" in out
 
 
 def test_a_maze_without_base_is_refused_after_the_picture_was_drawn(run):
