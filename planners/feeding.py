@@ -80,7 +80,8 @@ def feed(
     track, arc = _subdivided(track, link_length)
     sweep = UNCHECKED
     if walls is not None:
-        free, sweep = sweep_chords(track, arc, link_length, walls)
+        free, found = sweep_chords(track, arc, link_length, walls)
+        sweep = Sweep(*found)
         if not free:
             return Feeding(poses=np.empty((0, 0, 2)), ending=kernel.MEETS, place=tuple(track[0].tolist()))
     n_links = kernel.links_at_end(track, arc, link_length)

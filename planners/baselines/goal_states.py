@@ -89,7 +89,7 @@ def grown_goal_states(
             break
         chosen = _chosen(chains, joints, rng)
         draws = rng.random((len(chosen), MOST))
-        grown = grow(chains, chosen, arm.scene, arm.most_bent, guide, PROGRESS, draws)
+        grown = Chains(*grow(chains, chosen, arm.scene, arm.most_bent, guide, PROGRESS, draws))
         joints = len(chains.places) + np.arange(len(grown.places))
         chains = Chains(*(np.concatenate(pair) for pair in zip(chains, grown, strict=True)))
     return [], _points(chains, int(np.argmin(chains.to_go))) * arm.link_length

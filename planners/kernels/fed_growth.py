@@ -51,6 +51,9 @@ class Chains(NamedTuple):
     bent: FloatArray
 
 
+Grown = tuple[FloatArray, FloatArray, FloatArray, IntArray, IntArray, FloatArray, FloatArray]
+
+
 class Guide(NamedTuple):
     """A path to the goal, and what counts as there.
 
@@ -206,7 +209,7 @@ def _keeps_off_itself(chains: Chains, joint: int, place: FloatArray, off: float)
 def grow(
     chains: Chains, joints: IntArray, scene: FedScene, most_bent: float, guide: Guide, progress: float,
     draws: FloatArray,
-) -> Chains:  # fmt: skip
+) -> Grown:  # fmt: skip
     """Grow chains by a link each, in all ways that are tried.
 
     Parameters
@@ -228,8 +231,9 @@ def grow(
 
     Returns
     -------
-    grown : Chains
-        The new joints alone; parents are numbers in `chains`.
+    grown : tuple
+        The fields of `Chains` of the new joints alone; parents are numbers in `chains`. A named tuple would be
+        made by Python's code, in which Ctrl-C may arrive, and numba crashes then.
     """
     size = joints.shape[0] * MOST
     places, headings, angles = np.empty((size, 2)), np.empty(size), np.empty(size)
@@ -265,4 +269,4 @@ def grow(
             headings[n], angles[n], parents[n] = heading + tried[k], tried[k], joint
             guides[n], to_go[n], bent[n] = seen, rest, chains.bent[joint] + tried[k] ** 2
             n += 1
-    return Chains(places[:n], headings[:n], angles[:n], parents[:n], guides[:n], to_go[:n], bent[:n])
+    return places[:n], headings[:n], angles[:n], parents[:n], guides[:n], to_go[:n], bent[:n]

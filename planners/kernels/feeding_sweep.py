@@ -39,6 +39,9 @@ class Sweep(NamedTuple):
     crosses: BoolArray
 
 
+Found = tuple[FloatArray, FloatArray, FloatArray, IntArray, IntArray, BoolArray]
+
+
 @njit(cache=True, inline="always")
 def start_of_link(
     track: FloatArray, along: FloatArray, ends: FloatArray, row: int, squared: float, segment: int, last: int
@@ -208,7 +211,9 @@ def _mark_crossings(
 
 
 @njit(cache=True)
-def sweep_chords(track: FloatArray, arc: FloatArray, length: float, walls: FloatArray) -> tuple[bool, Sweep]:
+def sweep_chords(
+    track: FloatArray, arc: FloatArray, length: float, walls: FloatArray
+) -> tuple[bool, Found]:
     """Find what the chords of a track may meet; False if those that end at its points do meet walls.
 
     Parameters
@@ -219,6 +224,14 @@ def sweep_chords(track: FloatArray, arc: FloatArray, length: float, walls: Float
         In maze units.
     walls : array, shape (n_walls, 2, 2)
         Segments, in maze units.
+
+    Returns
+    -------
+    free : bool
+        Whether the chords that end at points of the track meet no wall.
+    found : tuple
+        The fields of `Sweep`; a named tuple would be made by Python's code, in which Ctrl-C may arrive, and
+        numba crashes then.
 
     Notes
     -----
@@ -231,7 +244,7 @@ def sweep_chords(track: FloatArray, arc: FloatArray, length: float, walls: Float
     crosses = np.zeros(n, dtype=np.bool_)
     places, members = np.zeros(n + 1, dtype=np.int64), np.empty(4 * n + 16, dtype=np.int64)
     first = _middle_chords(track, arc, length, middle, low, high, ends)
-    sweep = Sweep(walls, low, high, places, members, crosses)
+    found = (walls, low, high, places, members, crosses)
     begin, n_members = first - 1, 0
     middle[begin, 0], middle[begin, 1], middle[begin, 4] = track[0, 0], track[0, 1], 1e-8 * length
     middle[begin, 2], middle[begin, 3] = track[first, 0], track[first, 1]
@@ -240,7 +253,7 @@ def sweep_chords(track: FloatArray, arc: FloatArray, length: float, walls: Float
         if segments_meet(
             middle[begin, 0], middle[begin, 1], middle[begin, 2], middle[begin, 3], cx, cy, dx, dy
         ):
-            return False, sweep
+            return False, found
     near = np.empty(walls.shape[0], dtype=np.int64)
     for block in range(first, n, BLOCK):
         last, n_near = min(block + BLOCK, n), 0
@@ -273,7 +286,7 @@ def sweep_chords(track: FloatArray, arc: FloatArray, length: float, walls: Float
                 if high[j] >= 0.0 and segments_meet(
                     ends[j, 0], ends[j, 1], track[j + 1, 0], track[j + 1, 1], cx, cy, dx, dy
                 ):
-                    return False, sweep
+                    return False, found
     places[n] = n_members
     _mark_crossings(middle, arc, high, length, first, crosses)
-    return True, Sweep(walls, low, high, places, members, crosses)
+    return True, (walls, low, high, places, members, crosses)

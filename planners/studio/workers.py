@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 from queue import SimpleQueue
+from types import FrameType
 from typing import Any
 
 from hrsnake_env.errors import InputError
@@ -34,6 +35,9 @@ STOP = b"stop"
 """What a worker is sent to end a search with what it has."""
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+AGAIN_S = 0.01
+"""Seconds after which a search is interrupted again that could not be at that moment."""
 
 QUIET_S = 0.05
 """Seconds from one line of progress to the next, at least."""
@@ -181,11 +185,15 @@ class Desk:
         self.stopped, self.told = False, 0.0
         return job
 
-    def on_interrupt(self, *_: object) -> None:
+    def on_interrupt(self, _number: int = 0, frame: FrameType | None = None) -> None:
         """End a search early if that was asked for. Ctrl-C in the terminal concerns the server alone."""
-        if self.stopped and self.stoppable:
-            self.stoppable = False
-            raise KeyboardInterrupt
+        if not (self.stopped and self.stoppable):
+            return
+        if _in_foreign_code(frame):
+            threading.Timer(AGAIN_S, _thread.interrupt_main).start()
+            return
+        self.stoppable = False
+        raise KeyboardInterrupt
 
     @contextmanager
     def interruptible(self) -> Iterator[None]:
@@ -207,6 +215,15 @@ class Desk:
         if now - self.told >= QUIET_S:
             self.told = now
             self.say(type="progress", **fields)
+
+
+def _in_foreign_code(frame: FrameType | None) -> bool:
+    """Tell whether pymunk is at work: what frees its objects breaks, and is not run again, if it is interrupted."""
+    while frame is not None:
+        if frame.f_globals.get("__name__", "").partition(".")[0] in ("pymunk", "cffi"):
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _work(connection: Connection, worker_bytes: int) -> None:
