@@ -48,6 +48,9 @@ STATE = (
     | pymunk.batch.BodyFields.ANGULAR_VELOCITY
 )
 POSES = pymunk.batch.BodyFields.POSITION | pymunk.batch.BodyFields.ANGLE
+_IDLE: list[tuple[pymunk.batch.Buffer, pymunk.batch.Buffer]] = []
+"""Buffers of simulators that are no more, for the next ones: pymunk does not free what they have."""
+
 FORCES = pymunk.batch.BodyFields.FORCE | pymunk.batch.BodyFields.TORQUE
 
 
@@ -135,8 +138,15 @@ class Physics:
         self._frame_numbers = np.array([*self._frame.base_pose, self._scale])
         self._senses = Senses(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(N_READINGS))
         self._rays = np.zeros(N_TIP_RAYS + 2 * n)
-        self._reader, self._writer = pymunk.batch.Buffer(), pymunk.batch.Buffer()
+        self._reader, self._writer = _IDLE.pop() if _IDLE else (pymunk.batch.Buffer(), pymunk.batch.Buffer())
         self._writer.set_float_buf((self._all_poses if self.kinematic else self._forces).reshape(-1))
+
+    def __del__(self) -> None:
+        """Give back what pymunk would keep: the space for long, buffers for ever."""
+        if hasattr(self, "_space"):
+            self._space.close()
+        if hasattr(self, "_reader"):
+            _IDLE.append((self._reader, self._writer))
 
     # Running
 
@@ -194,6 +204,7 @@ class Physics:
         self._last_nodes[:] = self._nodes
         build = placed_chain if self.kinematic else ACTUATIONS[self._actuation]
         self._chain = build(self.n_links, SIM_LINK)
+        last = getattr(self, "_space", None)
         self._space = ArmSpace(
             self._wall_shapes,
             self._chain,
@@ -203,6 +214,8 @@ class Physics:
             frame=self._frame,
             walls=self.maze.walls,
         )
+        if last is not None:
+            last.close()
         self._space.clearances[:] = start.touched
         self._space.n_held = start.n_held
         self._space.activate_links(max(start.n_held - 1, 0))

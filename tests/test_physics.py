@@ -1,5 +1,7 @@
 """Laws of the simulator: it tracks, it repeats itself, walls push back, torques are what mechanics says."""
 
+import ctypes
+import gc
 import math
 import os
 import subprocess
@@ -300,6 +302,44 @@ def test_a_simulation_that_has_broken_down_stands_still_and_says_so():
     assert not physics.report().clean
     physics.reset()
     assert physics.finite
+
+
+class MallocState(ctypes.Structure):
+    """What glibc says of the memory in use (`struct mallinfo2`)."""
+
+    _fields_ = [
+        (name, ctypes.c_size_t)
+        for name in "arena ordblks smblks hblks hblkhd usmblks fsmblks in_use fordblks keepcost".split()
+    ]
+
+
+def memory_in_use():
+    """Return the bytes in use outside Python's own arenas; None where nobody counts them."""
+    try:
+        count = ctypes.CDLL("libc.so.6").mallinfo2
+    except (OSError, AttributeError):
+        return None
+    count.restype = MallocState
+    state = count()
+    return state.in_use + state.hblkhd
+
+
+@pytest.mark.skipif(memory_in_use() is None, reason="glibc 2.33 counts memory")
+@pytest.mark.parametrize("anew", [False, True], ids=["reset", "another simulator"])
+def test_an_episode_gives_back_its_memory_without_the_garbage_collector(anew):
+    physics, maze = Physics(fig19(), ARM), fig19()
+    gc.collect()
+    gc.disable()
+    try:
+        used = []
+        for _ in range(60):
+            physics = Physics(maze, ARM) if anew else physics
+            physics.reset()
+            physics.advance(0.1 * LENGTH, np.zeros(N_LINKS))
+            used.append(memory_in_use())
+    finally:
+        gc.enable()
+    assert used[-1] - used[10] < 50 * 40_000  # a space alone has a hundred thousand and more
 
 
 def test_a_second_episode_is_bit_identical_to_the_first():
