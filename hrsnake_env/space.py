@@ -141,9 +141,8 @@ class ArmSpace:
     def close(self) -> None:
         """Give back the memory that pymunk's space has outside Python.
 
-        pymunk's objects know themselves by handles, and are rings that way: Python looks for those when a great
-        many objects have gathered, and sees nothing of the quarter of a mebibyte that a space has (measured:
-        several hundred mebibytes of spaces, beside a library of learning).
+        pymunk's objects know themselves by handles, and are rings that way: Python looks for those when very
+        many objects have gathered, and sees nothing of the third of a mebibyte that a space has.
         """
         with self.space._space:  # cffi calls what frees it
             pass

@@ -309,7 +309,10 @@ class MallocState(ctypes.Structure):
 
     _fields_ = [
         (name, ctypes.c_size_t)
-        for name in "arena ordblks smblks hblks hblkhd usmblks fsmblks in_use fordblks keepcost".split()
+        for name in (
+            *("arena", "blocks", "small_blocks", "mapped_blocks", "mapped"),
+            *("most_used", "small_free", "in_use", "free", "top"),
+        )
     ]
 
 
@@ -321,7 +324,7 @@ def memory_in_use():
         return None
     count.restype = MallocState
     state = count()
-    return state.in_use + state.hblkhd
+    return state.in_use + state.mapped
 
 
 @pytest.mark.skipif(memory_in_use() is None, reason="glibc 2.33 counts memory")

@@ -62,7 +62,7 @@ def environments() -> dict[str, Any]:
 
 
 def orders(env: Any, seed: int) -> Iterator[Any]:
-    """Yield actions: those of the planner in a maze that does not change, random ones after that and elsewhere."""
+    """Yield actions: the planner's, where the maze does not change, and random ones after that."""
     if "Random" not in env.spec.id:
         motion = plan(env.unwrapped.maze, env.unwrapped.arm).motion
         assert motion is not None, env.spec.id

@@ -232,8 +232,8 @@ def grow(
     Returns
     -------
     grown : tuple
-        The fields of `Chains` of the new joints alone; parents are numbers in `chains`. A named tuple would be
-        made by Python's code, in which Ctrl-C may arrive, and numba crashes then.
+        The fields of `Chains` of the new joints alone; parents are numbers in `chains`. Python's code would
+        make a named tuple, Ctrl-C may arrive there, and numba crashes then.
     """
     size = joints.shape[0] * MOST
     places, headings, angles = np.empty((size, 2)), np.empty(size), np.empty(size)

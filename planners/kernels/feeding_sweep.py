@@ -228,8 +228,8 @@ def sweep_chords(track: FloatArray, arc: FloatArray, length: float, walls: Float
     free : bool
         Whether the chords that end at points of the track meet no wall.
     found : tuple
-        The fields of `Sweep`; a named tuple would be made by Python's code, in which Ctrl-C may arrive, and
-        numba crashes then.
+        The fields of `Sweep`. Python's code would make a named tuple, Ctrl-C may arrive there, and numba
+        crashes then.
 
     Notes
     -----

@@ -218,7 +218,7 @@ class Desk:
 
 
 def _in_foreign_code(frame: FrameType | None) -> bool:
-    """Tell whether pymunk is at work: what frees its objects breaks, and is not run again, if it is interrupted."""
+    """Tell whether pymunk is at work: what frees its objects is not run again once interrupted."""
     while frame is not None:
         if frame.f_globals.get("__name__", "").partition(".")[0] in ("pymunk", "cffi"):
             return True
