@@ -208,6 +208,8 @@ def main() -> None:
         os.environ.setdefault(name, "1")
     found: dict[str, Any] = {}
     faults = 0
+    for env in environments().values():  # compiles what the processes need, once
+        digest_of_episode(env, ask.seed)
     if ask.steps:
         found["steps"] = run(step_worker, ask.workers, ask.steps // ask.workers, ask.seed, "steps")
         faults += report("steps", found["steps"], "steps")
