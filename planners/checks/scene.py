@@ -14,6 +14,7 @@ from shapely.geometry import Polygon
 
 from hrsnake_env.arm import FloatArray, joints_from_configuration
 from hrsnake_env.maze import Maze
+from planners.checks.thin import ThinWalls
 from planners.checks.tolerances import PINCH_TOLERANCE, ROUNDING
 from planners.problem import Fault, Motion
 
@@ -89,6 +90,16 @@ class Scene:
         """Where every centre line lies that is not surely deeper in a wall than the pinch tolerance."""
         depth = max(PINCH_TOLERANCE * self.length - self.radius, ROUNDING * self.length)
         return prepared(self.maze.free_space.buffer(1.02 * depth))
+
+    @cached_property
+    def thin(self) -> ThinWalls:
+        """The walls in which depth alone says too little."""
+        return ThinWalls(maze=self.maze, tolerance=PINCH_TOLERANCE * self.length)
+
+    def may_tunnel(self, emerging: BoolArray) -> BoolArray:
+        """Say which links could cross a thin wall with their centre line, and yet not be too deep in it."""
+        slim = self.radius <= PINCH_TOLERANCE * self.length
+        return (emerging | slim) & self.thin.any if slim or emerging.any() else np.zeros_like(emerging)
 
     @cached_property
     def arc(self) -> FloatArray:
