@@ -405,7 +405,7 @@ def test_no_wall_is_too_thin_to_be_found_between_two_poses(width):
     assert (fault(report, "sweep").pose, fault(report, "sweep").link) == (n_straight + 4, 2)
 
 
-@pytest.mark.parametrize("width", [0.08, 0.01, 1e-4])
+@pytest.mark.parametrize("width", [0.08, 0.01])
 def test_a_thin_wall_may_be_touched_and_its_very_end_passed(width):
     beside, ahead = box(100.0, 0.0, 290.0, width), box(299.95, -width / 2, 390.0, width / 2)
     straight, turning = np.zeros((2, 10, 3))
