@@ -1,0 +1,88 @@
+"""Check random motions with `planners.validation` and with its twin in `swept`, and compare every figure.
+
+Run from the repository's root with `python -m benchmarks.trust.agreement --count 100000 --seed 0`; case n of a
+seed is drawn by `--only n`. `--shipped` looks at the motions that come with the project instead. Ends with one
+line per law, and with 1 if a law was broken.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from collections import Counter
+
+import numpy as np
+
+from benchmarks.trust.motions import draw_case
+from benchmarks.trust.results import write_results
+from benchmarks.trust.swept import DEEP, TIE, inspect
+from planners.bench.pool import bar
+from planners.validation import validate
+
+FIGURES = ("clearance", "penetration", "length_error", "largest_step", "goal_distance")
+
+
+def disagreements(motion, maze, arm, cores=()):
+    """Yield a law and a sentence for everything on which the checker and its twin do not agree."""
+    report, twin = validate(motion, maze, arm), inspect(motion, maze, arm, cores)
+    kinds, length = {fault.kind for fault in report.faults}, motion.link_length
+    for name in FIGURES:
+        one, other = getattr(report, name), getattr(twin, name)
+        if one != other and not abs(one - other) <= 1e-9 * length:
+            yield name, f"{name} is {one!r}, by the twin {other!r}, {(one - other) / length:.3g} links apart"
+    for kind, wanted in twin.faulty.items():
+        if kind == "sweep" and wanted and "penetration" in kinds:
+            continue  # it is said already of the pose
+        if wanted is not None and wanted is not (kind in kinds):
+            yield f"verdict: {kind}", f"{kind} is {kind in kinds}, by the twin {wanted}"
+    between = report.penetration_between
+    if not between + 1e-9 * length >= twin.between_low:
+        yield "bound between", f"the bound is {between!r}, the twin gets {twin.between_low!r} deep"
+    if math.isfinite(between) and not kinds & {"sweep", "penetration"} and between > DEEP * length * (1 + TIE):
+        yield "bound between", f"the bound is {between!r} without a fault"
+    if twin.swept_free and not report.penetration and between > DEEP * length / 8 * (1 + TIE):
+        yield "bound between", f"the bound is {between!r} where the swept areas are free"
+    if report.valid is bool(kinds):
+        yield "valid", f"valid is {report.valid} with the faults {sorted(kinds)}"
+
+
+def run(count, seed, only=None):
+    """Compare `count` cases; return counts by law and verdict, and the broken laws."""
+    seen, broken = Counter(), []
+    numbers = range(count) if only is None else [only]
+    try:
+        with bar("agreement", len(numbers)) as tell:
+            for number in numbers:
+                case = draw_case(np.random.default_rng([seed, number]))
+                seen["cases"] += 1
+                for law, sentence in disagreements(case.motion, case.maze, case.arm, case.cores):
+                    broken.append({"number": number, "law": law, "message": sentence})
+                    print(f"case {number}: {law}: {sentence}", flush=True)
+                tell()
+    except KeyboardInterrupt:
+        print("stopped")
+    return seen, broken
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--count", type=int, default=10_000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", type=int, help="one case alone")
+    options = parser.parse_args()
+    start = time.perf_counter()
+    seen, broken = run(options.count, options.seed, options.only)
+    seconds = time.perf_counter() - start
+    laws = Counter(fault["law"] for fault in broken)
+    print(f"agreement with the twin: {seen['cases']} cases, {len(broken)} faults, {seconds:.0f} s")
+    for law, n in laws.items():
+        print(f"  {law}: {n} faults")
+    figures = {"count": seen["cases"], "seed": options.seed, "seconds": seconds, "faults": broken[:1000]}
+    if options.only is None:
+        print(write_results("agreement", figures))
+    return 1 if broken else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
