@@ -10,7 +10,7 @@ import shapely
 from shapely import affinity
 from shapely.geometry import LineString, Point, Polygon, box
 
-from hrsnake_env.arm import ArmSpec
+from hrsnake_env.arm import ArmSpec, joints_from_configuration
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners.problem import Motion
@@ -95,10 +95,15 @@ def draw_wall(rng, motion, radius, thin):
     length = motion.link_length
     pose, link = rng.integers(motion.n_poses), rng.integers(motion.n_links)
     one, other = motion.joints[pose, link : link + 2]
+    if rng.random() < 0.5 and pose + 1 < motion.n_poses:  # where the link is between two poses
+        part = rng.random()
+        feed, angles = (a[pose] * (1 - part) + a[pose + 1] * part for a in (motion.feed, motion.joint_angles))
+        joints = joints_from_configuration(feed, angles, length, motion.base_pose)
+        one, other = joints[link : link + 2]
     share = float(rng.choice([0.0, 1.0, rng.random(), rng.uniform(-0.3, 1.3)]))
     along = (other - one) / max(np.linalg.norm(other - one), 1e-300)
     across = np.array([-along[1], along[0]]) * rng.choice([-1.0, 1.0])
-    off = radius + length * float(rng.choice([0.0, 10.0 ** rng.uniform(-6.0, -1.0), rng.uniform(-0.3, 0.5)]))
+    off = radius + length * float(rng.choice([0.0, 10.0 ** rng.uniform(-6.0, -1.0), rng.uniform(-0.1, 0.5)]))
     at, angle = one + share * (other - one) + off * across, math.atan2(along[1], along[0])
     if rng.random() < thin:
         size, width = length * rng.uniform(0.1, 1.5), length * 10.0 ** rng.uniform(-5.0, -2.5)

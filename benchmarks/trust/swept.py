@@ -33,7 +33,7 @@ class Findings:
     """Hold the figures, in maze units, and for each kind of fault whether it is there; None if that is open.
 
     `between_low` is a depth that some link reaches between poses, `swept_free` whether the swept areas are
-    free.
+    free, and `astray` how far the joints are from where the configuration puts them.
     """
 
     clearance: float = math.inf
@@ -42,6 +42,7 @@ class Findings:
     largest_step: float = 0.0
     goal_distance: float = 0.0
     between_low: float = 0.0
+    astray: float = 0.0
     swept_free: bool = True
     faulty: dict[str, bool | None] = field(default_factory=dict)
 
@@ -78,7 +79,8 @@ def _arm_alone(found, motion, maze, arm, joints, past):
 
     found.length_error = float(np.abs(np.abs(np.diff(joints, axis=1)) - length).max())
     found.judge("length", found.length_error, 1e-9 * length, rounding)
-    found.judge("inconsistent", float(np.abs(joints - placed).max()), 1e-6 * length, rounding)
+    found.astray = float(np.abs(joints - placed).max())
+    found.judge("inconsistent", found.astray, 1e-6 * length, rounding)
     if motion.n_poses > 1:
         found.largest_step = float(np.abs(np.diff(joints, axis=0)).max())
     found.judge("step", found.largest_step, 0.05 * length, 1.1e-9 * length)
@@ -144,10 +146,11 @@ class Walls:
         for one in np.argsort(-most):
             if most[one] <= best:
                 break
-            best = max(best, self._deepest_of(start[one], end[one]))
+            best = max(best, self._deepest_of(start[one], end[one], best))
         return best
 
-    def _deepest_of(self, start, end):
+    def _deepest_of(self, start, end, least):
+        """Return the depth of one segment, or 0 if it is less than `least`."""
         corners, along = np.unique(self.ends[:, 0]), self.ends[:, 1] - self.ends[:, 0]
         way, normal = end - start, 1j * along / np.abs(along)
         # Squares of distances to corners and to lines, as polynomials of the share of the way.
@@ -164,10 +167,8 @@ class Walls:
             shares = np.concatenate([half / a, c / half, [0.0, 1.0]])
         points = start + shares[(shares >= 0.0) & (shares <= 1.0)] * way
         depth = self.depth(points)
-        for k in np.argsort(-depth):
-            if not self.contains(points[k : k + 1])[0]:
-                return float(depth[k])
-        return 0.0
+        points, depth = points[depth > least], depth[depth > least]
+        return float(depth.max(where=~self.contains(points), initial=0.0))
 
 
 def dot(one, other):
@@ -215,9 +216,7 @@ def _at_poses(found, walls, joints, past, length):
         found.clearance = float(away.min()) - walls.radius
     found.penetration = max(0.0, -found.clearance)
     limit = 0.0 if walls.radius == 0.0 else 1e-9 * length
-    found.judge("penetration", found.penetration, limit, TIE * length)
-    if walls.radius == 0.0 and found.clearance > TIE * length:
-        found.faulty["penetration"] = False
+    found.judge("penetration", -found.clearance, limit, TIE * length)
 
 
 def _between(found, walls, motion, cores):

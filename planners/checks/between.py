@@ -36,6 +36,12 @@ GROUP = 1024
 MAX_PIECES = 40_000
 """How many pieces of one group there may be before the rest counts as not bounded."""
 
+LATE = MAX_SPLITS - 4
+"""After so many halvings there may be an eighth of them: only touched places are left of what is free."""
+
+OPEN_SAMPLES = 512
+"""How many pieces that are not bounded are looked at when a fault there is described."""
+
 FAULT_SAMPLES = 257
 """Times between two poses at which the depth is looked for when a fault there is described."""
 
@@ -181,7 +187,8 @@ def _swept(
         middle, arc = pieces.placed(scene, pieces.time.mean(axis=1))
         is_deep = _too_deep(scene, middle, scene.emerging(arc[:, 0]))
         deep.append(pieces[is_deep])
-        if level == MAX_SPLITS or 2 * len(pieces) > MAX_PIECES:
+        most = MAX_PIECES if level < LATE else MAX_PIECES // 8
+        if level == MAX_SPLITS or 2 * len(pieces) > most:
             break
         # One deep place is enough to know of a link between two poses.
         names = pieces.interval * scene.motion.n_links + pieces.link
@@ -249,6 +256,9 @@ def _sweep_fault(scene: Scene, open_: list[_Pieces]) -> Fault:
     """Name the worst of the pieces that are not bounded, by the depth at the middle of each."""
     worst: tuple[float, int, int] | None = None
     for pieces in open_:
+        chosen = np.zeros(len(pieces), dtype=bool)
+        chosen[:: 1 + len(pieces) // OPEN_SAMPLES] = True
+        pieces = pieces[chosen]
         middle, arc = pieces.placed(scene, pieces.time.mean(axis=1))
         clearance, index, _ = nearest(scene, middle, scene.emerging(arc[:, 0]))
         if worst is None or clearance < worst[0]:

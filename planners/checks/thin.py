@@ -58,17 +58,16 @@ class ThinWalls:
         parts = []
         for level in range(N_LEVELS):
             depth, around = self.depth(level), self._around(level)
-            inside = self._solid.buffer(-depth, quad_segs=4, join_style="mitre")
-            parts.append(inside.difference(around))
-        core = shapely.union_all(parts).difference(self._tips.buffer(2.0 * self.tolerance))
+            parts.append(self._less(self._solid.buffer(-depth), around))
+        core = self._less(shapely.union_all(parts), self._tips.buffer(2.0 * self.tolerance))
         shapely.prepare(core)
         return core
 
     def lines(self, level: int) -> Any:
         """Return the sides of walls that are thin for the depth of a level, less the ends of the walls."""
         if level not in self._lines:
-            sides = self.maze.free_space.boundary.difference(self._around(level))
-            lines = sides.difference(self._tips.buffer(2.0 * self.depth(level)))
+            sides = self._less(self.maze.free_space.boundary, self._around(level))
+            lines = self._less(sides, self._tips.buffer(2.0 * self.depth(level)))
             shapely.prepare(lines)
             self._lines[level] = lines
         return self._lines[level]
@@ -115,5 +114,14 @@ class ThinWalls:
     def _around(self, level: int) -> Any:
         """Return the walls that are thick for a level, with a little margin for what buffers leave out."""
         radius = self.depth(level) / SHARE / 2.0
-        thick = self._solid.buffer(-radius, join_style="mitre").buffer(radius, join_style="mitre")
+        # Shrinking with mitred corners now and then makes a polygon that is none; growing squares corners.
+        thick = self._solid.buffer(-radius).buffer(radius, join_style="mitre")
         return thick.buffer(self.depth(level) / 4.0, quad_segs=2)
+
+    def _less(self, geometry: Any, other: Any) -> Any:
+        """Return what is left of a geometry without another; on a fine grid where that fails without."""
+        try:
+            return geometry.difference(other)
+        except shapely.errors.GEOSException:
+            grid = 1e-13 * float(np.abs(geometry.bounds).max())
+            return shapely.difference(shapely.make_valid(geometry), shapely.make_valid(other), grid_size=grid)
