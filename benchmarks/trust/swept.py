@@ -125,7 +125,10 @@ class Walls:
             x, y, heading = maze.base_pose
             along, across = 2 * frame * np.exp(1j * heading), 2 * frame * 1j * np.exp(1j * heading)
             corners = [complex(x, y) + z for z in (across, across + along, along - across, -across)]
-            self.solid_in_front = self.solid.intersection(Polygon([(z.real, z.imag) for z in corners]))
+            front = self.solid.intersection(Polygon([(z.real, z.imag) for z in corners]))
+            # Walls that only touch the line across the base, by rounding or not, are not in front of it.
+            parts = [part for part in shapely.get_parts(front) if part.area > 1e-9 * radius**2]
+            self.solid_in_front = shapely.union_all(parts)
 
     def contains(self, points):
         """Say which points, complex, are in the free space or on its border."""
