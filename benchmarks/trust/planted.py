@@ -195,6 +195,7 @@ def _needle(motion, start, width, time=0.5):
 def _sweep(rng, motion, maze, arm, share):
     """Let the tip's arc reach over a wall between poses by a share of the tolerance, at neither of them."""
     motion = _turning(motion, rng)
+    share = share if share > 1.0 else 0.85 * share  # the bound is not so tight that the last of it is free
     wall = _needle(motion, 1.0 - share * 1e-3, 0.02)  # thick enough for its depth to count
     return motion, room(motion, wall), arm
 

@@ -66,10 +66,14 @@ class Scene:
 
     @cached_property
     def open_behind(self) -> Geometry:
-        """The free space together with everything behind the base: only walls in front are left."""
+        """The free space together with everything behind the base: only walls in front are left.
+
+        A wall that ends at the line across the base is behind it, whatever rounding makes of that.
+        """
         x, y, heading = self.motion.base_pose
         along = 2.0 * (self.maze.size + self.length) * np.array([math.cos(heading), math.sin(heading)])
-        across, base = np.array([-along[1], along[0]]), np.array([x, y])
+        across = np.array([-along[1], along[0]])
+        base = np.array([x + self.slack * math.cos(heading), y + self.slack * math.sin(heading)])
         behind = Polygon([base + across, base + across - along, base - across - along, base - across])
         return self.maze.free_space.union(behind)
 
