@@ -15,9 +15,16 @@ from collections import Counter
 import numpy as np
 
 from benchmarks.trust.motions import draw_case
+from benchmarks.trust.planted import KINDS, NAMED, plant
 from benchmarks.trust.results import write_results
 from benchmarks.trust.swept import DEEP, TIE, inspect
+from hrsnake_env.arm import ArmSpec
+from hrsnake_env.ladder import LADDER
+from hrsnake_env.maze import Maze
+from hrsnake_env.random_mazes import LINK_LENGTH, task_maze
+from planners import demo
 from planners.bench.pool import bar
+from planners.planning import plan
 from planners.validation import validate
 
 FIGURES = ("clearance", "penetration", "length_error", "largest_step", "goal_distance")
@@ -59,15 +66,52 @@ def planted_faults(count, seed):
         yield f"planted: {kind}", f"{share:.3f} of what is allowed: fault is {there}" if wrong else None
 
 
-def shipped_motions(long=True):
-    """Yield name, motion, maze and arm of what the project's own planners and experts make."""
-    for env_id in registered_ids() if long else registered_ids()[:2]:
-        env = gym.make(env_id).unwrapped
-        arm = ArmSpec(link_length=env.arm.link_length, link_radius=env.arm.link_radius)
-        result = plan(env.maze, arm)
-        env.close()
+def shipped_motions(rungs=None):
+    """Yield name, motion, maze and arm for what `auto` makes of the rungs of the ladder and named mazes."""
+    for name, rung in LADDER.items():
+        if rungs is not None and name not in rungs:
+            continue
+        maze, arm = Maze.load(rung.maze), ArmSpec(link_length=rung.link_length)
+        result = plan(maze, arm)
         if result.motion is not None:
-            yield env_id, result.motion, env.maze, arm
+            yield name, result.motion, maze, arm
+    if rungs is None:  # the demonstration, and the expert's in random mazes with its margins
+        yield "demo", *_demo()
+        for split in ("train", "test"):
+            for seed in range(20):
+                maze, arm = task_maze(split, seed), ArmSpec(link_length=LINK_LENGTH)
+                result = plan(maze, arm)
+                if result.motion is not None:
+                    yield f"random {split} {seed}", result.motion, maze, arm
+
+
+def _demo():
+    maze, arm = Maze.load("fig19"), ArmSpec(link_length=demo.LINK_LENGTH)
+    return plan(maze, arm, demo.PLANNER).motion, maze, arm
+
+
+def run_all(name, rows):
+    """Go through laws and sentences (None where all is well); return how many, and the broken ones."""
+    done, broken = 0, []
+    try:
+        for law, sentence in rows:
+            done += 1
+            if sentence is not None:
+                broken.append({"law": law, "message": sentence})
+                print(f"{name}: {law}: {sentence}", flush=True)
+    except KeyboardInterrupt:
+        print("stopped")
+    return done, broken
+
+
+def shipped_rows():
+    """Yield one row for each shipped motion that is all right, and one for each law that it breaks."""
+    for name, motion, maze, arm in shipped_motions():
+        found = list(disagreements(motion, maze, arm))
+        report = validate(motion, maze, arm)
+        if not report.valid:
+            found.append(("valid", f"faults {[fault.kind for fault in report.faults]}"))
+        yield from ((f"{name}: {law}", sentence) for law, sentence in found or [("all", None)])
 
 
 def run(count, seed, only=None):
@@ -93,8 +137,19 @@ def main():
     parser.add_argument("--count", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", type=int, help="one case alone")
+    parser.add_argument("--shipped", action="store_true", help="the project's own motions")
+    parser.add_argument("--planted", action="store_true", help="planted faults")
     options = parser.parse_args()
     start = time.perf_counter()
+    if options.shipped or options.planted:
+        name = "shipped" if options.shipped else "planted"
+        rows = shipped_rows() if options.shipped else planted_faults(options.count, options.seed)
+        done, broken = run_all(name, rows)
+        seconds = time.perf_counter() - start
+        print(f"{name}: {done} cases, {len(broken)} faults, {seconds:.0f} s")
+        figures = {"count": done, "seed": options.seed, "seconds": seconds, "faults": broken[:1000]}
+        print(write_results(f"agreement_{name}", figures))
+        return 1 if broken else 0
     seen, broken = run(options.count, options.seed, options.only)
     seconds = time.perf_counter() - start
     laws = Counter(fault["law"] for fault in broken)

@@ -134,7 +134,7 @@ def draw_spatial_case(rng):
                 room_high=high + length,
                 base=base_pose[:3],
                 heading=base_pose[3:],
-                straight=0.5 * length,
+                straight=1.001 * length,
                 goal=motion.joints[-1, -1],
                 goal_radius=0.1 * length,
                 boxes=np.array(boxes),
