@@ -18,6 +18,9 @@ from hrsnake_env.arm import ArmSpec
 from planners.problem import Motion
 from planners.validation import validate
 
+from planners.spatial.problem import SpatialMotion
+from planners.spatial.rooms import load_workspace
+from planners.spatial.validation import validate as validate_in_space
 from test_validation import corridor, hall, kinds, straight_in
 
 SEEDS = st.integers(0, 2**32)
@@ -77,4 +80,18 @@ def test_the_depth_at_a_pose_is_exact_to_a_billionth_of_a_link():
     maze = replace(corridor(), free_space=corridor().free_space.difference(pillar))
     maze = replace(maze, base_pose=np.array([100.0, 0.0, 0.0]))
     motion = Motion.from_configurations([100.0], [[0.0]], 100.0, maze.base_pose)
-    assert not [one for one in disagreements(motion, maze, ArmSpec(link_length=100.0)) if "sweep" not in one[0]]
+    assert not [
+        one for one in disagreements(motion, maze, ArmSpec(link_length=100.0)) if "sweep" not in one[0]
+    ]
+
+
+@pytest.mark.parametrize("bend", [0.0, 2.0])
+def test_a_single_pose_in_space_is_checked_against_itself(bend):
+    workspace = load_workspace("paired-panels")
+    base_pose = workspace.base_pose_for(10.0)
+    angles = np.zeros((1, 5, 2))
+    angles[0, 3:, 0] = bend  # past a right angle twice: the last link crosses the one before the one before
+    motion = SpatialMotion.from_configurations([50.0], angles, 10.0, base_pose)
+    assert (
+        "crossing" in kinds(validate_in_space(motion, workspace, ArmSpec(link_length=10.0, link_radius=3.0)))
+    ) is (bend > 0.0)

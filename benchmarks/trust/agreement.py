@@ -47,7 +47,11 @@ def disagreements(motion, maze, arm, cores=()):
     off = 1e-9 * length + twin.astray  # poses are as the joints say, between them the configuration decides
     if off < 1e-5 * length and not between + off >= twin.between_low:
         yield "bound between", f"the bound is {between!r}, the twin gets {twin.between_low!r} deep"
-    if math.isfinite(between) and not kinds & {"sweep", "penetration"} and between > DEEP * length * (1 + TIE):
+    if (
+        math.isfinite(between)
+        and not kinds & {"sweep", "penetration"}
+        and between > DEEP * length * (1 + TIE)
+    ):
         yield "bound between", f"the bound is {between!r} without a fault"
     if twin.swept_free and not report.penetration and between > DEEP * length * (1 + TIE):
         yield "bound between", f"the bound is {between!r} where the swept areas are free"
@@ -59,7 +63,10 @@ def planted_faults(count, seed):
     """Yield a law and a sentence for every planted fault that is not named, or named without being there."""
     for number in range(count):
         rng = np.random.default_rng([seed, number])
-        kind, share = KINDS[number % len(KINDS)], 1.0 + float(rng.choice([-1.0, 1.0])) * rng.uniform(0.02, 0.5)
+        kind, share = (
+            KINDS[number % len(KINDS)],
+            1.0 + float(rng.choice([-1.0, 1.0])) * rng.uniform(0.02, 0.5),
+        )
         report = validate(*plant(rng, kind, share))
         there = NAMED.get(kind, kind) in {fault.kind for fault in report.faults}
         wrong = there is not (share > 1.0)

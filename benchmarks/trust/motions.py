@@ -116,7 +116,12 @@ def draw_wall(rng, motion, radius, thin):
     kind = rng.integers(4)
     if kind == 0:  # a block whose side lies along the link
         sides = length * rng.uniform(0.02, 0.8, 2)
-        corners = [at, at + along * sides[0], at + along * sides[0] + across * sides[1], at + across * sides[1]]
+        corners = [
+            at,
+            at + along * sides[0],
+            at + along * sides[0] + across * sides[1],
+            at + across * sides[1],
+        ]
         return Polygon(corners), None
     if kind == 1:  # a block along the axes
         return box(*at, *(at + length * rng.uniform(0.02, 0.6, 2))), None

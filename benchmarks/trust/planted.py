@@ -211,14 +211,12 @@ def _thin_wall(rng, motion, maze, arm, share):
 def _crossing(rng, motion, maze, arm, share):
     """Curl thick links to within a share of twice their radius of each other."""
     angles = np.zeros((1, motion.n_links))
-    angles[0, -2:] = rng.uniform(1.65, 1.9) * rng.choice([-1.0, 1.0])
+    angles[0, -2:] = rng.uniform(1.75, 1.9) * rng.choice([-1.0, 1.0])
     feed, length = [motion.n_links * motion.link_length], motion.link_length
     curled = Motion.from_configurations(feed, angles, length, motion.base_pose)
     links = [LineString(curled.joints[0, k : k + 2]) for k in range(curled.n_links)]
-    apart = min(
-        links[k].distance(links[j]) for k in range(len(links)) for j in range(k + 2, len(links))
-    )
-    return curled, room(curled), replace(arm, link_radius=apart / 2.0 * share)
+    apart = min(links[k].distance(links[j]) for k in range(len(links)) for j in range(k + 2, len(links)))
+    return curled, room(curled), replace(arm, link_radius=apart / 2.0 * min(share, 1.2))
 
 
 def _remade(motion, feed=None, angles=None):

@@ -75,7 +75,9 @@ def spatial_disagreements(motion, workspace, arm):
     """Yield a law and a sentence for everything on which the checker and its twin do not agree."""
     report, length, radius = validate(motion, workspace, arm), motion.link_length, arm.link_radius
     kinds = {fault.kind for fault in report.faults}
-    clearance = float(least_distances(motion, workspace, motion.joints, motion.feed).min(initial=np.inf)) - radius
+    clearance = (
+        float(least_distances(motion, workspace, motion.joints, motion.feed).min(initial=np.inf)) - radius
+    )
     steps = np.linalg.norm(np.diff(motion.joints, axis=0), axis=2).max(initial=0.0)
     lengths = np.abs(np.linalg.norm(np.diff(motion.joints, axis=1), axis=2) - length).max()
     goal = float(np.linalg.norm(motion.joints[-1, -1] - workspace.goal))
@@ -85,7 +87,10 @@ def spatial_disagreements(motion, workspace, arm):
         if one != twin and not abs(one - twin) <= 1e-9 * length:
             yield name, f"{name} is {one!r}, by the twin {twin!r}"
     if abs(clearance + 1e-9 * length) > 1e-9 * length and (clearance < 0.0) is not ("penetration" in kinds):
-        yield "verdict: penetration", f"penetration is {'penetration' in kinds} at a clearance of {clearance!r}"
+        yield (
+            "verdict: penetration",
+            f"penetration is {'penetration' in kinds} at a clearance of {clearance!r}",
+        )
     share = np.arange(CUTS + 1)[:, None] / CUTS
     low = np.full(len(workspace.obstacles), np.inf)
     for before in range(motion.n_poses - 1):
@@ -96,7 +101,10 @@ def spatial_disagreements(motion, workspace, arm):
         low = np.minimum(low, least_distances(motion, workspace, joints, feeds))
     deep = radius - low
     if len(deep) and not report.penetration_between + 1e-9 * length >= deep.max():
-        yield "bound between", f"the bound is {report.penetration_between!r}, the twin gets {deep.max()!r} deep"
+        yield (
+            "bound between",
+            f"the bound is {report.penetration_between!r}, the twin gets {deep.max()!r} deep",
+        )
     allowed = np.minimum(1e-3 * length, np.ptp(workspace.obstacles, axis=1).min(axis=1, initial=np.inf) / 8.0)
     if (deep > allowed + 1e-9 * length).any() and not kinds & {"sweep", "penetration"}:
         yield "verdict: sweep", "no fault where the twin is deep in an obstacle"

@@ -281,10 +281,10 @@ def _hulls_free(walls, joints, past, turns, length):
     # A turn by d goes at most L d^2 / 8 beside the chord of the link's tip, and tips add up along the arm.
     sagitta = length / 8.0 * np.cumsum(turns**2, axis=1)
     grown = np.broadcast_to(sagitta[:, None], out.shape)[out] + walls.radius + 1e-9 * length
-    hulls = shapely.convex_hull(
-        shapely.multipoints(np.stack([quads[out].real, quads[out].imag], axis=-1))
+    hulls = shapely.convex_hull(shapely.multipoints(np.stack([quads[out].real, quads[out].imag], axis=-1)))
+    return bool(
+        shapely.covers(walls.free, hulls).all() and (shapely.distance(hulls, walls.solid) > grown).all()
     )
-    return bool(shapely.covers(walls.free, hulls).all() and (shapely.distance(hulls, walls.solid) > grown).all())
 
 
 def _crossing(found, walls, joints, past, turns, push, length):
@@ -303,7 +303,9 @@ def _crossing(found, walls, joints, past, turns, push, length):
             continue
         ends = [placed[..., k] for k in (one, one + 1, other, other + 1)]
         apart = segment_distances(*ends)
-        met |= bool((apart[out] < limit - TIE * length).any()) if limit else bool(cross_over(*ends)[out].any())
+        met |= (
+            bool((apart[out] < limit - TIE * length).any()) if limit else bool(cross_over(*ends)[out].any())
+        )
         room = apart - stray[:, None, one] - stray[:, None, other]
         near = min(near, float(room[maybe].min()))
     found.faulty["crossing"] = True if met else (False if near > limit + 2 * TIE * length else None)
@@ -328,5 +330,6 @@ def cross_over(a, b, c, d):
     eps = 1e-9 * np.maximum(np.abs(b - a), np.abs(d - c))
     one, other = (side(a, b, c), side(a, b, d)), (side(c, d, a), side(c, d, b))
     return np.logical_and.reduce(
-        [np.minimum(*pair) < -eps for pair in (one, other)] + [np.maximum(*pair) > eps for pair in (one, other)]
+        [np.minimum(*pair) < -eps for pair in (one, other)]
+        + [np.maximum(*pair) > eps for pair in (one, other)]
     )
