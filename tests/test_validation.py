@@ -410,7 +410,7 @@ def test_a_thin_wall_may_be_touched_and_its_very_end_passed(width):
     beside, ahead = box(100.0, 0.0, 290.0, width), box(299.95, -width / 2, 390.0, width / 2)
     straight, turning = np.zeros((2, 10, 3))
     turning[:, 2] = np.linspace(0.0, -0.4, 10)  # away from the wall that the arm lies on
-    passing = turning + (0.0, 0.0, 0.2)
+    passing = turning + np.array([0.0, 0.0, 0.2])
     feeds = np.linspace(250.0, 286.0, 10)
     for wall, angles, feed in ((beside, straight, feeds), (beside, turning, 300.0), (ahead, passing, 300.0)):
         maze = hall(wall, goal=(50.0, 50.0))

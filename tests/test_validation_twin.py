@@ -1,4 +1,4 @@
-"""The checker and a second one, written from scratch, agree; every planted fault is named, and no other is."""
+"""The checker and a second one, written from scratch, agree; planted faults are named, and no other."""
 
 import math
 from dataclasses import replace
@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import affinity
 from shapely.geometry import box
+from test_validation import corridor, hall, kinds, straight_in
 
 from benchmarks.trust.agreement import disagreements, shipped_motions
 from benchmarks.trust.motions import draw_case
@@ -16,12 +17,10 @@ from benchmarks.trust.planted import KINDS, NAMED, good_motion, plant
 from benchmarks.trust.spatial_agreement import draw_spatial_case, spatial_disagreements
 from hrsnake_env.arm import ArmSpec
 from planners.problem import Motion
-from planners.validation import validate
-
 from planners.spatial.problem import SpatialMotion
 from planners.spatial.rooms import load_workspace
 from planners.spatial.validation import validate as validate_in_space
-from test_validation import corridor, hall, kinds, straight_in
+from planners.validation import validate
 
 SEEDS = st.integers(0, 2**32)
 
@@ -77,8 +76,8 @@ def test_a_wall_flush_with_the_base_is_behind_it_whatever_rounding_says(heading)
 def test_the_depth_at_a_pose_is_exact_to_a_billionth_of_a_link():
     # A square pillar under 30 degrees: the deepest point of the link is as far from two of its sides.
     pillar = affinity.rotate(box(130.0, -20.0, 170.0, 25.0), 30.0)
-    maze = replace(corridor(), free_space=corridor().free_space.difference(pillar))
-    maze = replace(maze, base_pose=np.array([100.0, 0.0, 0.0]))
+    free = corridor().free_space.difference(pillar)
+    maze = replace(corridor(), free_space=free, base_pose=np.array([100.0, 0.0, 0.0]))
     motion = Motion.from_configurations([100.0], [[0.0]], 100.0, maze.base_pose)
     assert not [
         one for one in disagreements(motion, maze, ArmSpec(link_length=100.0)) if "sweep" not in one[0]

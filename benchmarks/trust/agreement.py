@@ -1,8 +1,8 @@
 """Check random motions with `planners.validation` and with its twin in `swept`, and compare every figure.
 
-Run from the repository's root with `python -m benchmarks.trust.agreement --count 100000 --seed 0`; case n of a
-seed is drawn by `--only n`. `--shipped` looks at the motions that come with the project instead. Ends with one
-line per law, and with 1 if a law was broken.
+Run from the repository's root with `python -m benchmarks.trust.agreement --count 100000 --seed 0`; case n
+of a seed is drawn by `--only n`. `--shipped` looks at the motions that come with the project instead. Ends
+with one line per law, and with 1 if a law was broken.
 """
 
 from __future__ import annotations

@@ -1,15 +1,17 @@
 """Check random motions in space with `planners.spatial.validation` and with a plain twin, and compare.
 
-Run from the repository's root with `python -m benchmarks.trust.spatial_agreement --count 1000 --seed 0`. The
-twin takes one link and one box at a time. Apart from each other, the square of their distance is a parabola
-between the places where the link passes the planes of the box's sides; one in the other, the sides of all that
-the box covers when it slides along the link are tried for the shortest way out. Between poses it samples.
+Run from the repository's root with `python -m benchmarks.trust.spatial_agreement --count 1000 --seed 0`.
+The twin takes one link and one box at a time. Apart from each other, the square of their distance is a
+parabola between the places where the link passes the planes of the box's sides; one in the other, the sides
+of all that the box covers when it slides along the link are tried for the shortest way out. Between poses
+it samples.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
+from itertools import pairwise
 
 import numpy as np
 
@@ -33,7 +35,7 @@ def signed_distance(start, end, low, high):
         cuts = np.concatenate([(low - start) / way, (high - start) / way, [0.0, 1.0]])
     cuts = np.unique(cuts[(cuts >= 0.0) & (cuts <= 1.0)])
     shares = list(cuts)
-    for one, other in zip(cuts[:-1], cuts[1:], strict=True):
+    for one, other in pairwise(cuts):
         middle = start + (one + other) / 2.0 * way
         outside = (middle < low) | (middle > high)
         level = np.where(middle < low, low, high)

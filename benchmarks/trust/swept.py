@@ -1,11 +1,13 @@
 """A second checker of planar motions, written from scratch: slow, plain, and sharing nothing with the first.
 
-At the poses all is exact. A link in a wall is deepest at one of its ends, or where two features of the walls
-(corners, or lines that walls lie on) are equally far from it: between such places the distance to every feature
-is convex along the link, so the least of them is largest at an end. All these places are listed and measured.
+At the poses all is exact. A link in a wall is deepest at one of its ends, or where two features of the
+walls (corners, or lines that walls lie on) are equally far from it: between such places the distance to
+every feature is convex along the link, so the least of them is largest at an end. All these places are
+listed and measured.
 
-Between poses the way is cut into `CUTS` pieces. The link at the cuts says how deep it gets at least; the hulls
-of its places at two neighbouring cuts, grown by how far a turning link leaves them at most, say what it sweeps.
+Between poses the way is cut into `CUTS` pieces. The link at the cuts says how deep it gets at least; the
+hulls of its places at two neighbouring cuts, grown by how far a turning link leaves them at most, say what
+it sweeps.
 """
 
 from __future__ import annotations
@@ -65,7 +67,7 @@ def inspect(motion, maze, arm, cores=()):
     joints = motion.joints[..., 0] + 1j * motion.joints[..., 1]
     past = motion.feed[:, None] - (motion.n_links - np.arange(motion.n_links + 1)) * length
     _arm_alone(found, motion, maze, arm, joints, past)
-    walls = Walls(maze, arm.link_radius)
+    walls = Walls(maze, arm.link_radius, length)
     _at_poses(found, walls, joints, past, length)
     _between(found, walls, motion, cores)
     return found
@@ -112,7 +114,7 @@ def _arm_alone(found, motion, maze, arm, joints, past):
 class Walls:
     """The walls, as what is solid and as segments."""
 
-    def __init__(self, maze, radius):
+    def __init__(self, maze, radius, length):
         x_min, y_min, x_max, y_max = maze.free_space.bounds
         frame = 2.0 * math.hypot(x_max - x_min, y_max - y_min)
         everything = shapely.box(x_min - frame, y_min - frame, x_max + frame, y_max + frame)
@@ -123,6 +125,7 @@ class Walls:
         self.solid_in_front = self.solid
         if radius > 0.0:
             x, y, heading = maze.base_pose
+            x, y = x + 1e-9 * length * math.cos(heading), y + 1e-9 * length * math.sin(heading)
             along, across = 2 * frame * np.exp(1j * heading), 2 * frame * 1j * np.exp(1j * heading)
             corners = [complex(x, y) + z for z in (across, across + along, along - across, -across)]
             front = self.solid.intersection(Polygon([(z.real, z.imag) for z in corners]))
@@ -238,7 +241,7 @@ def _between(found, walls, motion, cores):
     past = feed[..., None] - (n_links - np.arange(n_links + 1)) * length
     _swept(found, walls, joints, past, turns, length, cores)
     _crossing(found, walls, joints, past, turns, push, length)
-    if folded >= 0.0 or found.faulty["crossing"] is False and folded > -1e-11:
+    if folded >= 0.0 or (found.faulty["crossing"] is False and folded > -1e-11):
         found.faulty["crossing"] = True if folded >= 0.0 else None
 
 
