@@ -395,11 +395,28 @@ def test_a_wall_cut_only_between_two_poses_is_found_there():
     assert np.linalg.norm(np.array(found.place) - (200.0, 0.0) - offset) < 6.0
 
 
-def test_a_wall_thinner_than_the_pinch_tolerance_may_be_crossed_between_poses_and_the_bound_says_so():
-    maze, motion, _ = past_needle(0.08)
+@pytest.mark.parametrize("width", [0.19, 0.08, 0.01, 1e-4, 1e-7, 1e-12])
+def test_no_wall_is_too_thin_to_be_found_between_two_poses(width):
+    maze, motion, _ = past_needle(width)
     report = validate(motion, maze)
-    assert "sweep" not in kinds(report)
-    assert 0.04 * 0.99 <= report.penetration_between <= PINCH_TOLERANCE * 100.0
+    assert kinds(report) == {"sweep", "goal"}
+    assert report.penetration == 0.0
+    n_straight = motion.n_poses - 10
+    assert (fault(report, "sweep").pose, fault(report, "sweep").link) == (n_straight + 4, 2)
+
+
+@pytest.mark.parametrize("width", [0.08, 0.01])
+def test_a_thin_wall_may_be_touched_and_its_very_end_passed(width):
+    beside, ahead = box(100.0, 0.0, 290.0, width), box(299.95, -width / 2, 390.0, width / 2)
+    straight, turning = np.zeros((2, 10, 3))
+    turning[:, 2] = np.linspace(0.0, -0.4, 10)  # away from the wall that the arm lies on
+    passing = turning + np.array([0.0, 0.0, 0.2])
+    feeds = np.linspace(250.0, 286.0, 10)
+    for wall, angles, feed in ((beside, straight, feeds), (beside, turning, 300.0), (ahead, passing, 300.0)):
+        maze = hall(wall, goal=(50.0, 50.0))
+        feed = np.broadcast_to(feed, 10)
+        report = validate(Motion.from_configurations(feed, angles, 100.0, maze.base_pose), maze)
+        assert not kinds(report) & {"penetration", "sweep"}, (report.faults, feed[0])
 
 
 @pytest.mark.parametrize("radius", [0.0, 5.0])

@@ -13,6 +13,7 @@ import shapely
 from hrsnake_env.arm import FloatArray
 from planners.checks.gaps import Walls, complex_from_points, depths_from_gaps, moves_evenly
 from planners.checks.scene import MAX_SPLITS, BoolArray, Geometry, IntArray, Scene, halves, point_of, prepared
+from planners.checks.thin import N_LEVELS, SHARE
 from planners.checks.tolerances import PINCH_TOLERANCE, ROUNDING
 from planners.checks.walls import are_deep, nearest
 from planners.problem import Fault, Progress
@@ -23,6 +24,9 @@ ARC_SEGMENTS = 32
 GROWTHS = (1e-6, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 7 / 8)
 """By how much the free space is grown between poses, in pinch tolerances; the first is for rounding alone."""
 
+FINE_GROWTHS = tuple(0.5 / 4.0**level for level in range(N_LEVELS))
+"""The same where walls are thin: half of what a wall of each thickness allows, the rest is for the curve."""
+
 PATIENCE = 6
 """How often a piece is halved before depths over an eighth of the tolerance are accepted."""
 
@@ -31,6 +35,12 @@ GROUP = 1024
 
 MAX_PIECES = 40_000
 """How many pieces of one group there may be before the rest counts as not bounded."""
+
+LATE = MAX_SPLITS - 4
+"""After so many halvings there may be an eighth of them: only touched places are left of what is free."""
+
+OPEN_SAMPLES = 512
+"""How many pieces that are not bounded are looked at when a fault there is described."""
 
 FAULT_SAMPLES = 257
 """Times between two poses at which the depth is looked for when a fault there is described."""
@@ -175,9 +185,10 @@ def _swept(
         in_time = (curve >= np.minimum(twist, tolerance / 32.0)) | (swerve > 0.0)
         in_time, pieces = in_time[left], pieces[left]
         middle, arc = pieces.placed(scene, pieces.time.mean(axis=1))
-        is_deep = are_deep(scene, middle, scene.emerging(arc[:, 0]))
+        is_deep = _too_deep(scene, middle, scene.emerging(arc[:, 0]))
         deep.append(pieces[is_deep])
-        if level == MAX_SPLITS or 2 * len(pieces) > MAX_PIECES:
+        most = MAX_PIECES if level < LATE else MAX_PIECES // 8
+        if level == MAX_SPLITS or 2 * len(pieces) > most:
             break
         # One deep place is enough to know of a link between two poses.
         names = pieces.interval * scene.motion.n_links + pieces.link
@@ -215,22 +226,39 @@ def _hull_depth(
 ) -> FloatArray:
     """Bound the depth of hulls of `corners`, shape (n, 4, 2), grown by `curve`; infinite beyond `limit`."""
     depth = np.full(len(corners), np.inf)
-    for growth in np.array(GROWTHS) * PINCH_TOLERANCE * scene.length:
+    tunnels = scene.may_tunnel(emerging) if len(corners) else emerging
+    growths = GROWTHS if not tunnels.any() else sorted({*GROWTHS, *FINE_GROWTHS})
+    for growth in np.array(growths) * PINCH_TOLERANCE * scene.length:
         rest = np.flatnonzero(np.isinf(depth) & (growth + curve <= limit))
         if not len(rest):
             continue
         region = region_of(float(growth))
         rest = rest[region.depth + curve[rest] <= limit]
         hulls = shapely.convex_hull(shapely.linestrings(corners[rest]))
-        free = rest[region.covers(hulls, emerging[rest])]
+        covered = region.covers(hulls, emerging[rest])
+        thin = np.flatnonzero(covered & tunnels[rest])
+        covered[thin] = scene.thin.keeps_off(hulls[thin], growth + curve[rest[thin]])
+        free = rest[covered]
         depth[free] = region.depth + curve[free]
     return depth
+
+
+def _too_deep(scene: Scene, segments: FloatArray, emerging: BoolArray) -> BoolArray:
+    """Say which capsules are surely deeper in a wall than allowed between poses."""
+    deep = are_deep(scene, segments, emerging)
+    tunnels = scene.may_tunnel(emerging) if len(emerging) else emerging
+    if tunnels.any():
+        deep[tunnels] |= shapely.intersects(scene.thin.core, shapely.linestrings(segments[tunnels]))
+    return deep
 
 
 def _sweep_fault(scene: Scene, open_: list[_Pieces]) -> Fault:
     """Name the worst of the pieces that are not bounded, by the depth at the middle of each."""
     worst: tuple[float, int, int] | None = None
     for pieces in open_:
+        chosen = np.zeros(len(pieces), dtype=bool)
+        chosen[:: 1 + len(pieces) // OPEN_SAMPLES] = True
+        pieces = pieces[chosen]
         middle, arc = pieces.placed(scene, pieces.time.mean(axis=1))
         clearance, index, _ = nearest(scene, middle, scene.emerging(arc[:, 0]))
         if worst is None or clearance < worst[0]:
@@ -250,7 +278,8 @@ def _sweep_fault(scene: Scene, open_: list[_Pieces]) -> Fault:
     if amount <= PINCH_TOLERANCE * scene.length:
         amount, what = (
             math.inf,
-            f"could not be shown to get at most {PINCH_TOLERANCE:g} link lengths deep in a wall",
+            f"could not be shown to get at most {PINCH_TOLERANCE:g} link lengths deep in a wall, "
+            f"and at most {SHARE:g} of its thickness",
         )
     message = f"Link {link} {what} between poses {pose} and {pose + 1}."
     return Fault(kind="sweep", message=message, pose=pose, link=link, place=point_of(place), amount=amount)

@@ -81,10 +81,13 @@ def depths_from_gaps(
     """Bound the depths of moving links in walls, infinite where there is no bound up to `limit`.
 
     Their centre lines are in the free space if they touch no wall and a point of them is. Of emerging links
-    some walls may be nearer: here they count all the same.
+    some walls may be nearer: here they count all the same. Where walls are thin none may be entered.
     """
     depth = np.maximum(scene.radius + curve - gap, 0.0)
     sure = (gap > scene.slack) & (depth <= np.where(emerging, 0.0, limit))
+    entered = sure & (curve >= gap)
+    if entered.any():
+        sure[entered] = ~scene.may_tunnel(emerging[entered])
     sure[sure] = shapely.contains_xy(scene.free, point[sure].real, point[sure].imag)
     return np.where(sure, depth, np.inf)
 

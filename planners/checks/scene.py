@@ -14,6 +14,7 @@ from shapely.geometry import Polygon
 
 from hrsnake_env.arm import FloatArray, joints_from_configuration
 from hrsnake_env.maze import Maze
+from planners.checks.thin import ThinWalls
 from planners.checks.tolerances import PINCH_TOLERANCE, ROUNDING
 from planners.problem import Fault, Motion
 
@@ -65,10 +66,14 @@ class Scene:
 
     @cached_property
     def open_behind(self) -> Geometry:
-        """The free space together with everything behind the base: only walls in front are left."""
+        """The free space together with everything behind the base: only walls in front are left.
+
+        A wall that ends at the line across the base is behind it, whatever rounding makes of that.
+        """
         x, y, heading = self.motion.base_pose
         along = 2.0 * (self.maze.size + self.length) * np.array([math.cos(heading), math.sin(heading)])
-        across, base = np.array([-along[1], along[0]]), np.array([x, y])
+        across = np.array([-along[1], along[0]])
+        base = np.array([x + self.slack * math.cos(heading), y + self.slack * math.sin(heading)])
         behind = Polygon([base + across, base + across - along, base - across - along, base - across])
         return self.maze.free_space.union(behind)
 
@@ -89,6 +94,16 @@ class Scene:
         """Where every centre line lies that is not surely deeper in a wall than the pinch tolerance."""
         depth = max(PINCH_TOLERANCE * self.length - self.radius, ROUNDING * self.length)
         return prepared(self.maze.free_space.buffer(1.02 * depth))
+
+    @cached_property
+    def thin(self) -> ThinWalls:
+        """The walls in which depth alone says too little."""
+        return ThinWalls(maze=self.maze, tolerance=PINCH_TOLERANCE * self.length)
+
+    def may_tunnel(self, emerging: BoolArray) -> BoolArray:
+        """Say which links could cross a thin wall with their centre line, and yet not be too deep in it."""
+        slim = self.radius <= PINCH_TOLERANCE * self.length
+        return (emerging | slim) & self.thin.any if slim or emerging.any() else np.zeros_like(emerging)
 
     @cached_property
     def arc(self) -> FloatArray:

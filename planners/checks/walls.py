@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from hrsnake_env.arm import FloatArray
-from planners.checks.scene import CHUNK, PLACE_SLACK, BoolArray, Nearest, Scene, point_of, worst_of
+from planners.checks.scene import CHUNK, BoolArray, Nearest, Scene, point_of, worst_of
 from planners.checks.tolerances import PINCH_TOLERANCE, ROUNDING
 from planners.problem import Fault, Progress
 
@@ -82,7 +82,7 @@ def _deepest(scene: Scene, segments: FloatArray) -> Nearest:
     parts, owner = shapely.get_parts(outside, return_index=True)
     parts, owner = parts[~shapely.is_empty(parts)], owner[~shapely.is_empty(parts)]
     ends = np.stack([shapely.get_coordinates(shapely.get_point(parts, k)) for k in (0, -1)], axis=1)
-    walls, accuracy = scene.maze.walls, 0.1 * PLACE_SLACK * scene.length
+    walls, accuracy = scene.maze.walls, 0.1 * ROUNDING * scene.length
     # What is not covered is outside, even where rounding leaves nothing of it.
     depth, index, place = 1e-15 * scene.maze.size, 0, segments[0].mean(axis=0)
     for first in range(0, len(ends), CHUNK):

@@ -132,7 +132,12 @@ class Scene:
 
     @cached_property
     def third(self) -> FloatArray:
-        """Bounds on the third derivatives of places after each pose, shape (n_steps, n_links + 1)."""
+        """Bounds on the third derivatives of places after each pose, shape (n_steps, n_links + 1).
+
+        A single pose counts as a step that stands still.
+        """
+        if self.motion.n_poses == 1:
+            return np.zeros((1, self.motion.n_links + 1))
         return self.length * third_derivatives(self.motion.joint_angles)
 
     def steps(self, first: int, last: int) -> Moves:
