@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
+import reprlib
 import zipfile
-from collections.abc import Mapping
 from pathlib import Path
 from typing import IO, Any
 
@@ -32,6 +33,9 @@ TEXT_BYTES = 32 * 2**20
 
 MEMBERS = 1000
 """That an archive may have: each costs far more memory than its bytes."""
+
+LARGE_BITS = 256
+"""Of a whole number that no message shows."""
 
 SHOWN = 60
 """Characters of what came that a message shows at most."""
@@ -123,15 +127,22 @@ def read_json(path: str | os.PathLike[str]) -> Any:
 
 def shown(value: Any) -> str:
     """Return a value that somebody sent for a message: short, however much refers to itself in it."""
-    if isinstance(value, Mapping | list | tuple | set | frozenset):
-        return f"{type(value).__name__} of {len(value)}"
-    if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > 4 * SHOWN:
-        return "a very large number"
-    text = repr(value[: SHOWN + 1] if isinstance(value, str | bytes) else value)
+    text = _Short().repr(value)
     return text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}..."
 
 
-def check_archive(file: IO[bytes], most_bytes: int) -> None:
+class _Short(reprlib.Repr):
+    """Look at the first parts of a value alone."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlevel, self.maxstring, self.maxother = 3, SHOWN, SHOWN
+
+    def repr_int(self, x: int, level: int) -> str:
+        return "a very large number" if x.bit_length() > LARGE_BITS else str(x)
+
+
+def check_archive(file: IO[bytes], most_bytes: float = math.inf) -> None:
     """Refuse a zip file that would be too large when it is unpacked, or packed in a way that is not usual.
 
     Raises
@@ -146,7 +157,7 @@ def check_archive(file: IO[bytes], most_bytes: int) -> None:
     with zipfile.ZipFile(file) as archive:
         members = archive.infolist()
     if sum(member.file_size for member in members) > most_bytes:
-        raise NotReadable(f"one of more than {most_bytes // 2**20} MiB when it is unpacked")
+        raise NotReadable(f"one of more than {most_bytes / 2**20:.0f} MiB when it is unpacked")
     # Other ways of packing unpack blocks of any size at once.
     if any(member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for member in members):
         raise NotReadable(NO_ARCHIVE)

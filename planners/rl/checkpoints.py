@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import warnings
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,9 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hrsnake_env.arguments import is_number
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
-from planners.reading import NotReadable, check_archive, read_arrays
+from planners.reading import TEXT_BYTES, NotReadable, check_archive, read_arrays
 
 __all__ = ["read_model", "read_progress", "restore", "write_checkpoint"]
 
@@ -27,10 +29,11 @@ MODEL, BUFFER, PROGRESS = "model.zip", "replay_buffer.npz", "progress.json"
 PICKLED = "replay_buffer.pkl"
 """What checkpoints of old versions have instead of `BUFFER`."""
 
-MOST_BYTES = 2**30
-"""That a checkpoint, or what is packed in it, may take when it is unpacked."""
+MODEL_BYTES = 2**30
+"""That a model may take, and what is packed in it."""
 
-PROGRESS_BYTES = 32 * 2**20
+MARGIN = 2**20
+"""For the names of arrays and the like."""
 
 QUICK = 1
 """Compression level: the unused part of a replay buffer is all zeros, and shrinks at any."""
@@ -59,8 +62,8 @@ def write_checkpoint(path: Path, model: Any, progress: dict[str, Any]) -> None:
         if getattr(model, "replay_buffer", None) is not None:
             buffer = io.BytesIO()
             arrays: dict[str, Any] = dict(_arrays_of(model.replay_buffer))
-            place = {"pos": np.array(model.replay_buffer.pos), "full": np.array(model.replay_buffer.full)}
-            np.savez(buffer, **arrays, **place)
+            arrays |= {"pos": np.array(model.replay_buffer.pos), "full": np.array(model.replay_buffer.full)}
+            np.savez(buffer, **arrays)
             archive.writestr(BUFFER, buffer.getvalue(), zipfile.ZIP_DEFLATED, QUICK)
 
 
@@ -74,11 +77,9 @@ def read_progress(path: Path) -> dict[str, Any]:
     """
     try:
         with open(path, "rb") as file:
-            check_archive(file, 2 * MOST_BYTES)
+            check_archive(file)
             with zipfile.ZipFile(file) as archive:
-                if archive.getinfo(PROGRESS).file_size > PROGRESS_BYTES:
-                    raise NotReadable
-                return dict(json.loads(archive.read(PROGRESS)))
+                return dict(json.loads(_member(archive, PROGRESS, TEXT_BYTES)))
     except Exception:  # zip, zlib and json raise whatever their parsers stumble over
         raise InputError(f"Expected a checkpoint (.zip) in '{path}', got a file that is not one.") from None
 
@@ -105,13 +106,13 @@ def read_model(path: Path, load: Callable[[io.BytesIO], Any]) -> Any:
     """
     try:
         with open(path, "rb") as file:
-            check_archive(file, 2 * MOST_BYTES)
+            check_archive(file)
             with zipfile.ZipFile(file) as archive:
                 if PICKLED in archive.namelist():
                     raise NotReadable("one of an old version, whose replay buffer is pickled")
-                model = load(io.BytesIO(archive.read(MODEL)))
+                model = load(io.BytesIO(_member(archive, MODEL, MODEL_BYTES)))
                 if getattr(model, "replay_buffer", None) is not None:
-                    _fill(model.replay_buffer, io.BytesIO(archive.read(BUFFER)))
+                    _fill(model.replay_buffer, archive)
     except Exception as error:  # what comes of a file that holds something else, or of other versions
         what = " ".join(str(error).split())[:200]
         raise InputError(f"Expected a checkpoint that can be read in '{path}', got: {what}.") from None
@@ -133,25 +134,22 @@ def restore(model: Any, file: io.BytesIO) -> Any:
     model : stable_baselines3 model
         The same.
     """
-    from stable_baselines3.common.save_util import load_from_zip_file, recursive_setattr
+    from stable_baselines3.common.save_util import load_from_zip_file
 
-    check_archive(file, MOST_BYTES)
+    check_archive(file, MODEL_BYTES)
     with zipfile.ZipFile(file) as archive:
         counters = json.loads(archive.read("data"))
     file.seek(0)
     # Weights alone: torch reads these with `weights_only`, and the rest is not read at all.
     _, weights, variables = load_from_zip_file(file, load_data=False, device="cpu")
     model.set_parameters(weights, exact_match=True, device="cpu")
-    for name, value in (variables or {}).items():
-        if value is not None:
-            if name not in model._excluded_save_params() and name != "log_ent_coef":
-                raise NotReadable(f"a variable {name!r} that there is not")
-            recursive_setattr(model, f"{name}.data", value.data)
+    for name in model._get_torch_save_params()[1]:
+        if (own := getattr(model, name)) is not None:
+            own.data.copy_((variables or {})[name].data)
     for name in COUNTERS:
-        value = counters.get(name, 0)
-        if isinstance(value, bool) or not isinstance(value, int | float):
+        if not is_number(counters[name]):
             raise NotReadable(f"{name} that is no number")
-        setattr(model, name, value)
+        setattr(model, name, counters[name])
     return model
 
 
@@ -163,9 +161,18 @@ def _arrays_of(buffer: Any) -> Iterator[tuple[str, NDArray[Any]]]:
                 yield f"{name}.{key}" if key else name, array
 
 
-def _fill(buffer: Any, file: io.BytesIO) -> None:
+def _member(archive: zipfile.ZipFile, name: str, most_bytes: int) -> bytes:
+    if archive.getinfo(name).file_size > most_bytes:
+        raise NotReadable(f"one whose {name} is larger than {most_bytes // 2**20} MiB")
+    return archive.read(name)
+
+
+def _fill(buffer: Any, archive: zipfile.ZipFile) -> None:
     """Put what was saved into a replay buffer that is just made."""
-    arrays = read_arrays(file, most_bytes=2 * MOST_BYTES)
+    if getattr(buffer, "copy_info_dict", False):
+        raise NotReadable("a replay buffer with infos, which a checkpoint does not hold")
+    most_bytes = sum(array.nbytes for _, array in _arrays_of(buffer)) + MARGIN
+    arrays = read_arrays(io.BytesIO(_member(archive, BUFFER, most_bytes)), most_bytes=most_bytes)
     pos, full = int(arrays["pos"]), bool(arrays["full"])
     if not 0 <= pos < buffer.buffer_size:
         raise NotReadable(f"place {pos} in a replay buffer of {buffer.buffer_size}")
@@ -174,5 +181,8 @@ def _fill(buffer: Any, file: io.BytesIO) -> None:
             raise NotReadable(f"a replay buffer whose {name} has another shape")
         own[...] = arrays[name]
     buffer.pos, buffer.full = pos, full
-    if hasattr(buffer, "truncate_last_trajectory"):  # episodes begin anew, so that hindsight cuts these off
-        buffer.truncate_last_trajectory()
+    if hasattr(buffer, "truncate_last_trajectory"):
+        with warnings.catch_warnings():
+            # Episodes begin anew, and so hindsight has to cut off those that were running.
+            warnings.filterwarnings("ignore", message="The last trajectory in the replay buffer")
+            buffer.truncate_last_trajectory()
