@@ -303,4 +303,7 @@ def _bound_from_dict(data: dict[str, Any]) -> RodBound:
     path = data["path"]
     if not (is_number(data["lower"]) and is_number(data["upper"]) and isinstance(data["proven"], bool)):
         raise ValueError("no bound")
-    return RodBound(**{**data, "path": None if path is None else RodPath(**path)})
+    rod = None if path is None else RodPath(**path)
+    if rod is not None and not (is_number(rod.length) and rod.tails.shape == (*rod.headings.shape, 2)):
+        raise ValueError("no path of a rod")
+    return RodBound(**{**data, "path": rod})

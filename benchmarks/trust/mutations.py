@@ -80,7 +80,8 @@ def mutated_value(value, rng):
         elif kind == 1:
             holder[str(strange(rng))[:50]] = strange(rng)
         elif kind == 2 and isinstance(holder[key], int | float) and not isinstance(holder[key], bool):
-            holder[key] = float(holder[key]) * float(rng.choice([-1.0, 0.0, 1e-9, 1e9, 1e200, 0.999]))
+            if abs(holder[key]) < 1e300:
+                holder[key] = holder[key] * float(rng.choice([-1.0, 0.0, 1e-9, 1e9, 1e200, 0.999]))
         elif kind == 3:
             other, its = places[rng.integers(0, len(places))]
             if its in other if isinstance(other, dict) else its < len(other):
@@ -193,7 +194,9 @@ def mutated_archive(members, rng, bomb=None):
     elif kind == 6:
         del data[f"{names[rng.integers(0, len(names))]}.npy"]
     elif kind == 7:
-        data[["extra.npy", "../up.npy", "/abs.npy", "extra", "a" * 3000][rng.integers(0, 5)]] = npy(np.zeros(3))
+        data[["extra.npy", "../up.npy", "/abs.npy", "extra", "a" * 3000][rng.integers(0, 5)]] = npy(
+            np.zeros(3)
+        )
     elif kind == 8 and bomb is not None:
         return bomb
     elif kind == 9:
@@ -215,10 +218,12 @@ def mutated_archive(members, rng, bomb=None):
 def bomb_of(name, mebibytes=600):
     """Return an archive of a few hundred kilobytes that claims, truly, to hold very many zeros."""
     file, block = io.BytesIO(), bytes(2**20)
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-        with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-            size = mebibytes * 2**17
-            member.write(claimed(f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({size},), }}"))
-            for _ in range(mebibytes):
-                member.write(block)
+    with (
+        zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
+        archive.open(f"{name}.npy", "w", force_zip64=True) as member,
+    ):
+        size = mebibytes * 2**17
+        member.write(claimed(f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({size},), }}"))
+        for _ in range(mebibytes):
+            member.write(block)
     return file.getvalue()

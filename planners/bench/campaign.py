@@ -153,7 +153,7 @@ def _opened(study: str, out: Path) -> Path:
     folder = out / CELLS
     try:
         manifest = read_json(out / MANIFEST)
-        known = manifest["study"] if isinstance(manifest["runs"], list) else None
+        known, _ = manifest["study"], list(manifest["runs"])
     except FileNotFoundError:
         known = study
     except (NotReadable, KeyError, TypeError):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
-from planners.reading import NotReadable, read_arrays
+from planners.reading import NotReadable, read_arrays, shown
 from planners.rl.environments import make_env
 from planners.rl.origin import Origin
 
@@ -69,7 +69,7 @@ class NetworkPolicy:
 
     def __post_init__(self) -> None:
         if self.activation not in ACTIVATIONS:
-            raise InputError(f"Unknown activation {self.activation!r}. Available: {', '.join(ACTIVATIONS)}.")
+            raise InputError(f"Unknown activation {shown(self.activation)}. Available: {', '.join(ACTIVATIONS)}.")
         width = sum(length for _, length in self.observation)
         for weights, bias in self.hidden:
             width = _check_layer(weights, bias, width)
