@@ -513,14 +513,9 @@ def _draw_call(rng):
     kind = ["plan", "check", "longest", "export", "map", "nothing"][rng.integers(0, 6)]
     body = _draw_request(kind, rng) if kind != "nothing" else rng.bytes(30)
     headers = {"host": "127.0.0.1", "content-type": "application/json", "content-length": str(len(body))}
-    headers = (
-        {
-            str(key): str(value)
-            for key, value in (mutated_value(headers, rng) if rng.random() < 0.3 else headers).items()
-        }
-        if rng.random() < 0.9
-        else {}
-    )
+    other = mutated_value(headers, rng)
+    if rng.random() < 0.4 and isinstance(other, dict):
+        headers = {str(key): str(value) for key, value in other.items()}
     path = f"/api/{kind}" if rng.random() < 0.9 else mutated_bytes(b"/api/mazes/fig19", rng).decode("latin1")
     method = "POST" if rng.random() < 0.9 else ["GET", "PUT", "OPTIONS", "x"][rng.integers(0, 4)]
     return {"method": method, "path": path, "headers": headers, "body": body}

@@ -29,7 +29,7 @@ from benchmarks.trust.file_readers import PLANTED, READERS
 from hrsnake_env.errors import InputError
 from planners.bench.pool import bar
 
-SECONDS, BYTES, SENTENCE = 10.0, 2**30, 3000
+SECONDS, BYTES, SENTENCE = 10.0, 2**30, 10_000
 """That one input may take, and characters of a message."""
 
 OUT = Path("benchmarks/results/trust")
