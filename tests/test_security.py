@@ -15,6 +15,9 @@ UNPICKLES = (
     *("pandas.read_pickle", "pd.read_pickle", "load_replay_buffer", "load_from_pkl"),
 )
 
+PICKLES = ("pickle", "marshal", "shelve")
+"""Modules that are not imported at all."""
+
 UNSAFE_YAML = ("yaml.load", "yaml.load_all", "yaml.unsafe_load", "yaml.full_load")
 
 ALLOWED: dict[tuple[str, str], str] = {}
@@ -36,12 +39,9 @@ def faults_in(text, file="x.py"):
     found = []
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import | ast.ImportFrom):
-            names = (
-                [alias.name for alias in node.names] if isinstance(node, ast.Import) else [node.module or ""]
-            )
-            found += [
-                f"import {name}" for name in names if name.split(".")[0] in ("pickle", "marshal", "shelve")
-            ]
+            plain = isinstance(node, ast.Import)
+            names = [alias.name for alias in node.names] if plain else [node.module or ""]
+            found += [f"import {name}" for name in names if name.split(".")[0] in PICKLES]
         if not isinstance(node, ast.Call):
             continue
         name, keywords = name_of(node), {each.arg: each.value for each in node.keywords}
