@@ -133,6 +133,23 @@ def test_settings_may_refer_to_others(tmp_path):
     assert load_settings("ppo", file_readers.STRAIGHT, file=path).n_timesteps == 1000
 
 
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("env_kwargs", {"n_links": 10**6}),
+        ("env_kwargs", {"substeps": 10**9}),
+        ("wrappers", [["planners.wrappers.ActionRepeat", {"repeat": 10**9}]]),
+    ],
+)
+def test_a_policy_asks_for_no_environment_without_end(key, value, tmp_path):
+    arrays = dict(file_readers._policy_arrays())
+    meta = json.loads(str(arrays["meta"]))
+    meta["origin"][key] = value
+    np.savez(tmp_path / "p.npz", **{**arrays, "meta": np.array(json.dumps(meta))})
+    with pytest.raises(InputError, match=r"Expected .* of at most \d+ for a policy"):
+        NetworkPolicy.load(tmp_path / "p.npz")
+
+
 # Pickles
 
 

@@ -69,7 +69,8 @@ class NetworkPolicy:
 
     def __post_init__(self) -> None:
         if self.activation not in ACTIVATIONS:
-            raise InputError(f"Unknown activation {shown(self.activation)}. Available: {', '.join(ACTIVATIONS)}.")
+            names = ", ".join(ACTIVATIONS)
+            raise InputError(f"Unknown activation {shown(self.activation)}. Available: {names}.")
         width = sum(length for _, length in self.observation)
         for weights, bias in self.hidden:
             width = _check_layer(weights, bias, width)

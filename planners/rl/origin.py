@@ -6,6 +6,7 @@ import importlib.metadata
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from hrsnake_env.arguments import is_number
 from hrsnake_env.errors import InputError
 from planners.reading import shown
 from planners.rl.environments import Wrappers
@@ -22,6 +23,16 @@ KINDS: dict[str, type] = {
     "versions": dict,
 }
 """What a file holds for each."""
+
+LARGEST = {
+    "image_size": 4096,
+    "max_episode_steps": 1_000_000,
+    "n_links": 2000,
+    "repeat": 1000,
+    "substeps": 1000,
+    "success_hold_steps": 1_000_000,
+}
+"""Arguments in a file with which somebody else could let an environment take all memory, or all time."""
 
 PACKAGES = ("hrsnake", "numpy", "gymnasium", "stable-baselines3", "sb3-contrib", "torch")
 
@@ -77,6 +88,10 @@ class Origin:
             named = isinstance(pair, list) and len(pair) == 2 and isinstance(pair[0], str)
             if not named or not isinstance(pair[1], dict):
                 raise InputError(f"Expected wrappers of a policy as names with arguments, got {shown(pair)}.")
+        for arguments in (data["env_kwargs"], *(kwargs for _, kwargs in data["wrappers"])):
+            for key, most in LARGEST.items():
+                if is_number(value := arguments.get(key)) and value > most:
+                    raise InputError(f"Expected {key} of at most {most} for a policy, got {shown(value)}.")
         return cls(**{**data, "wrappers": tuple((name, kwargs) for name, kwargs in data["wrappers"])})
 
     @staticmethod
