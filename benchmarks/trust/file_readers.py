@@ -87,7 +87,7 @@ def bend_motion():
 
 @functools.cache
 def bomb(name):
-    """Return an archive that takes 600 MiB when it is unpacked."""
+    """Return an archive that takes 300 MiB when it is unpacked."""
     return mutations.bomb_of(name)
 
 

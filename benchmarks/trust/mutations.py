@@ -215,7 +215,7 @@ def mutated_archive(members, rng, bomb=None):
     return whole
 
 
-def bomb_of(name, mebibytes=600):
+def bomb_of(name, mebibytes=300):
     """Return an archive of a few hundred kilobytes that claims, truly, to hold very many zeros."""
     file, block = io.BytesIO(), bytes(2**20)
     with (

@@ -24,6 +24,8 @@ KINDS: dict[str, type] = {
 }
 """What a file holds for each."""
 
+MOST_WRAPPERS = 20
+
 LARGEST = {
     "image_size": 4096,
     "max_episode_steps": 1_000_000,
@@ -84,6 +86,8 @@ class Origin:
             raise InputError(
                 f"Unknown origin {shown(unknown[0])} of a policy. Available: {', '.join(KINDS)}."
             )
+        if len(data["wrappers"]) > MOST_WRAPPERS:
+            raise InputError(f"Expected at most {MOST_WRAPPERS} wrappers, got {len(data['wrappers'])}.")
         for pair in data["wrappers"]:
             named = isinstance(pair, list) and len(pair) == 2 and isinstance(pair[0], str)
             if not named or not isinstance(pair[1], dict):
