@@ -285,3 +285,16 @@ def test_a_broken_file_is_bad_input_for_the_command_line(name, in_folder, monkey
 def test_a_device_is_no_file():
     with pytest.raises(NotReadable, match="a folder or a device"):
         read_arrays("/dev/null")
+
+
+def test_a_name_that_is_too_long_is_no_maze():
+    with pytest.raises(InputError, match="Unknown maze"):
+        Maze.load("a" * 5000)
+
+
+def test_a_map_whose_name_has_line_breaks_gets_one_sentence():
+    from hrsnake_env.maps import read_map
+
+    with pytest.raises(InputError) as raised:
+        read_map("\n\r", files=lambda name: b"")
+    assert "\n" not in str(raised.value)
