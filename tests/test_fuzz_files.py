@@ -17,6 +17,7 @@ from benchmarks.trust.file_readers import PLANTED, READERS, Planted
 from benchmarks.trust.fuzz_files import fault_of, watched
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
+from hrsnake_env.maze import Maze
 from planners import validate
 from planners.cli import main
 from planners.problem import Motion
