@@ -48,5 +48,5 @@ def numbers(what: str, value: Any) -> NDArray[np.float64]:
     """
     try:
         return np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"Expected {what} in numbers, got {value!r}.") from None

@@ -182,7 +182,7 @@ class Maze:
         if kind in SEEDED_MAZES and seed.isascii() and seed.isdigit():
             return SEEDED_MAZES[kind](int(seed))
         if Path(text).suffix.lower() not in (".geojson", ".json"):
-            if Path(text).is_file():
+            if os.path.isfile(text):  # false where the name is too long, which `Path` raises for
                 raise InputError(
                     f"Expected a maze (.geojson), but '{text}' is another file: if it is a map, "
                     f"`hrsnake import {text} --out maze.geojson` makes a maze of it."

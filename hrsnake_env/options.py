@@ -109,7 +109,7 @@ def _start(given: Mapping[str, Any], n_links: int) -> tuple[float, FloatArray]:
         feed, angles = given.get("feed", 0.0), given.get("joint_angles", np.zeros(n_links))
         if not is_number(feed):
             raise InputError(f"Expected a feed in numbers, got {feed!r}.")
-        return float(feed), numbers("joint_angles", angles)
+        return float(numbers("a feed", feed)), numbers("joint_angles", angles)
     motion = given["motion"]
     if not (hasattr(motion, "feed") and hasattr(motion, "joint_angles")):
         raise InputError(f"Expected a motion with feed and joint_angles, got {motion!r}.")

@@ -32,8 +32,11 @@ from planners.cli_tools import (
     LimitOption,
     MazeArgument,
     MotionArgument,
+    OwnLimitOption,
+    OwnRadiusOption,
     PlannerOption,
     RadiusOption,
+    arm_of,
     check_folder,
     check_output,
     examples,
@@ -180,8 +183,8 @@ def longest_command(
 def validate_command(
     maze: MazeArgument,
     motion: MotionArgument,
-    link_radius: RadiusOption = 0.0,
-    joint_limit: LimitOption = None,
+    link_radius: OwnRadiusOption = None,
+    joint_limit: OwnLimitOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Check a motion exactly: lengths, feeder, clearance, crossings, start and goal.
@@ -190,7 +193,7 @@ def validate_command(
     broken; the table says which, where and by how much.
     """
     world, moved = Maze.load(maze), Motion.load(motion)
-    arm = _arm(moved.link_length, moved.n_links, link_radius, joint_limit)
+    arm = arm_of(moved, link_radius, joint_limit)
     with progress_bars(as_json) as progress:
         report = validate(moved, world, arm, progress)
     print_outcome(
@@ -203,7 +206,7 @@ def validate_command(
 def simulate_command(
     maze: MazeArgument,
     motion: MotionArgument,
-    link_radius: RadiusOption = 0.0,
+    link_radius: OwnRadiusOption = None,
     substeps: Annotated[int, typer.Option("--substeps", help="Simulated steps per action.")] = 4,
     out: Annotated[Path | None, typer.Option("--out", help="Write an animation (.gif).")] = None,
     replay: Annotated[
@@ -222,13 +225,13 @@ def simulate_command(
     check_output(out, (".gif",))
     check_output(replay, (".html",))
     world, moved = Maze.load(maze), Motion.load(motion)
-    arm = _arm(moved.link_length, moved.n_links, link_radius, None)
+    arm = arm_of(moved, link_radius)
     with progress_bars(as_json) as progress:
         episode = simulate_motion(moved, world, arm, substeps=substeps, progress=progress)
         if out is not None:
             _animate(world, episode, out, progress)
         if replay is not None:
-            save_replay([episode.trace(world, link_radius=link_radius)], replay)
+            save_replay([episode.trace(world, link_radius=arm.link_radius)], replay)
     print_outcome(
         as_json,
         {
@@ -246,7 +249,7 @@ def simulate_command(
 def draw_command(
     maze: MazeArgument,
     motion: Annotated[Path | None, typer.Argument(metavar="[MOTION]", help="A motion (.npz) to add.")] = None,
-    link_radius: RadiusOption = 0.0,
+    link_radius: OwnRadiusOption = None,
     out: Annotated[Path | None, typer.Option("--out", help="The picture (.png, .svg, .pdf).")] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -262,7 +265,8 @@ def draw_command(
         moved.check_maze(world)
     picture = Path(f"{world.name}.png") if out is None else out
     check_output(picture, PICTURES)
-    summary = draw_geometry(world, moved, picture, link_radius)
+    radius = (link_radius or 0.0) if moved is None else arm_of(moved, link_radius).link_radius
+    summary = draw_geometry(world, moved, picture, radius)
     print_outcome(
         as_json, {**summary, "out": str(picture)}, lambda: tables.show_geometry(world, summary, picture)
     )

@@ -9,19 +9,18 @@ from typing import Annotated, Any
 
 import typer
 
-from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners import tables
 from planners.cli_tools import (
     NOT_CLEAN,
     JsonOption,
-    LimitOption,
-    RadiusOption,
+    OwnLimitOption,
+    OwnRadiusOption,
+    arm_of,
     check_output,
     print_outcome,
     progress_bars,
-    radians,
 )
 from planners.export import (
     DEFAULT_RATE,
@@ -80,14 +79,14 @@ def export_command(
             help="For ROS 2 and URDF; known for m, cm, mm, in, ft and other units of length.",
         ),
     ] = None,
-    link_radius: RadiusOption = 0.0,
-    joint_limit: LimitOption = None,
+    link_radius: OwnRadiusOption = None,
+    joint_limit: OwnLimitOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Write a motion as a trajectory within limits of speed and acceleration, checked as the motion is.
 
     --out arm.csv writes a table, --out arm.yaml a ROS 2 trajectory_msgs/msg/JointTrajectory, --out arm.urdf
-    the arm, --out arm.mp4 a video. --link-radius and --joint-limit are the arm's: give them as to plan.
+    the arm, --out arm.mp4 a video. The arm is the one that the motion was planned for.
     """
     name = format_for(out, format)
     check_output(out, (EXPORTS[name].ending, ".yml") if name == "ros2-yaml" else (EXPORTS[name].ending,))
@@ -100,7 +99,7 @@ def export_command(
         ),
     )
     world, moved = _loaded(maze, motion)
-    arm = ArmSpec(link_length=moved.link_length, link_radius=link_radius, joint_limit=radians(joint_limit))
+    arm = arm_of(moved, link_radius, joint_limit)
     try:
         with progress_bars(as_json) as progress:
             made = save_export(

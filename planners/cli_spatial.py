@@ -16,7 +16,10 @@ from planners.cli_tools import (
     PICTURES,
     JsonOption,
     LimitOption,
+    OwnLimitOption,
+    OwnRadiusOption,
     RadiusOption,
+    arm_of,
     check_folder,
     check_output,
     examples,
@@ -103,13 +106,13 @@ def plan_command(
 def validate_command(
     workspace: WorkspaceArgument,
     motion: Annotated[Path, typer.Argument(metavar="MOTION", help="A motion in space (.npz).")],
-    link_radius: RadiusOption = 0.0,
-    joint_limit: LimitOption = None,
+    link_radius: OwnRadiusOption = None,
+    joint_limit: OwnLimitOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Check a motion exactly: lengths, feeder, clearance at and between poses, crossings, start and goal."""
     room, moved = load_workspace(workspace), SpatialMotion.load(motion)
-    arm = ArmSpec(link_length=moved.link_length, link_radius=link_radius, joint_limit=radians(joint_limit))
+    arm = arm_of(moved, link_radius, joint_limit)
     with progress_bars(as_json) as progress:
         report = validate(moved, room, arm, progress)
     print_outcome(
@@ -165,7 +168,7 @@ def longest_command(
 def draw_command(
     workspace: WorkspaceArgument,
     motion: Annotated[Path, typer.Argument(metavar="MOTION", help="A motion in space (.npz).")],
-    link_radius: RadiusOption = 0.0,
+    link_radius: OwnRadiusOption = None,
     out: Annotated[Path | None, typer.Option("--out", help="The picture (.png, .svg, .pdf).")] = None,
     page: PageOption = None,
     as_json: JsonOption = False,
@@ -177,7 +180,7 @@ def draw_command(
         raise InputError("Expected --out (a picture) or --page (a page that turns and plays), got neither.")
     room, moved = load_workspace(workspace), SpatialMotion.load(motion)
     moved.check_workspace(room)
-    _show(room, moved, out, page, worst=True, link_radius=link_radius)
+    _show(room, moved, out, page, worst=True, link_radius=arm_of(moved, link_radius).link_radius)
     written = [str(file) for file in (out, page) if file is not None]
     print_outcome(
         as_json, {"written": written}, lambda: print("\n".join(f"Written: {file}" for file in written))

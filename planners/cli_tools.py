@@ -5,17 +5,23 @@ from __future__ import annotations
 import json
 import math
 import os
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import MAZES
 from planners.planning import PLANNERS
-from planners.problem import Progress
+from planners.problem import Motion, Progress
+
+if TYPE_CHECKING:
+    from planners.spatial.problem import SpatialMotion
 
 __all__ = [
     "BAD_INPUT",
@@ -27,8 +33,11 @@ __all__ = [
     "LimitOption",
     "MazeArgument",
     "MotionArgument",
+    "OwnLimitOption",
+    "OwnRadiusOption",
     "PlannerOption",
     "RadiusOption",
+    "arm_of",
     "check_folder",
     "check_output",
     "examples",
@@ -74,6 +83,15 @@ LimitOption = Annotated[
     typer.Option("--joint-limit", help="Largest joint angle, in degrees. By default there is none."),
 ]
 
+OwnRadiusOption = Annotated[
+    float | None,
+    typer.Option("--link-radius", help="Half the thickness of the links. By default what the motion says."),
+]
+OwnLimitOption = Annotated[
+    float | None,
+    typer.Option("--joint-limit", help="Largest joint angle, in degrees. By default what the motion says."),
+]
+
 
 def examples(lines: Sequence[str]) -> str:
     """Return the end of a help page: one example to a line."""
@@ -85,6 +103,30 @@ def radians(joint_limit: float | None) -> float | None:
     if joint_limit is not None and not 0.0 < joint_limit <= 180.0:
         raise InputError(f"Expected --joint-limit over 0 and at most 180 degrees, got {joint_limit:g}.")
     return None if joint_limit is None else math.radians(joint_limit)
+
+
+def arm_of(
+    motion: Motion | SpatialMotion, link_radius: float | None, joint_limit: float | None = None
+) -> ArmSpec:
+    """Return the arm of a motion, but for what was given (degrees); say on stderr where that differs."""
+    own, limit = motion.arm, radians(joint_limit)
+    arm = replace(
+        own,
+        link_radius=own.link_radius if link_radius is None else link_radius,
+        joint_limit=own.joint_limit if limit is None else limit,
+    )
+    if arm.link_radius != own.link_radius:
+        _note(f"--link-radius {arm.link_radius:g}", f"of radius {own.link_radius:g}")
+    if limit is not None and not math.isclose(limit, own.joint_limit or math.inf):
+        bent = (
+            "that bend freely" if own.joint_limit is None else f"of {math.degrees(own.joint_limit):g} degrees"
+        )
+        _note(f"--joint-limit {joint_limit:g}", f"with joints {bent}")
+    return arm
+
+
+def _note(given: str, own: str) -> None:
+    print(f"Note: {given} is used; the motion was made for links {own}.", file=sys.stderr)
 
 
 def lengths_in(text: str) -> list[float]:

@@ -12,16 +12,21 @@ from typing import Any
 
 import numpy as np
 
+from hrsnake_env.arguments import is_number
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
 from planners.problem import Motion, PlanningResult, PlanningStatus
+from planners.reading import NotReadable, read_json, shown
 from planners.rod_bound import RodBound, RodPath
 
 __all__ = ["LengthTrial", "TrialFile", "digest_of", "motion_path"]
 
 KIND = "hrsnake longest"
 """Stands in every file of trials, so that no other file is taken for one, or overwritten."""
+
+FIGURES = ("n_links", "n_poses", "joint_range", "joint_speed", "turning")
+"""What is known of a trial with a motion alone."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,6 +129,12 @@ class LengthTrial:
         """Build a trial from what `to_dict` returned."""
         names = {each.name for each in dataclasses.fields(cls)}
         values = {name: value for name, value in data.items() if name in names}
+        for name, value in values.items():
+            texts = name in ("status", "planner", "reason")
+            if not (
+                isinstance(value, str) if texts else is_number(value) or (value is None and name in FIGURES)
+            ):
+                raise ValueError(f"no {name}: {shown(value)}")
         return cls(**{**values, "status": PlanningStatus(values["status"])})
 
 
@@ -202,7 +213,7 @@ class TrialFile:
         try:
             file.bound = _bound_from_dict(data["bound"])
             trials = [LengthTrial.from_dict(each) for each in data["trials"]]
-        except (KeyError, TypeError, ValueError):
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
             raise InputError(
                 f"Expected a state of `longest` in '{file.path}', got a damaged one; delete it to start anew."
             ) from None
@@ -263,10 +274,10 @@ class TrialFile:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = read_json(path)
     except OSError as error:
         raise InputError(f"Expected a state of `longest` at '{path}', got: {error.strerror}.") from None
-    except ValueError:
+    except NotReadable:
         data = None
     if not isinstance(data, dict) or data.get("kind") != KIND:
         raise InputError(
@@ -290,4 +301,9 @@ def _bound_to_dict(bound: RodBound) -> dict[str, Any]:
 
 def _bound_from_dict(data: dict[str, Any]) -> RodBound:
     path = data["path"]
-    return RodBound(**{**data, "path": None if path is None else RodPath(**path)})
+    if not (is_number(data["lower"]) and is_number(data["upper"]) and isinstance(data["proven"], bool)):
+        raise ValueError("no bound")
+    rod = None if path is None else RodPath(**path)
+    if rod is not None and not (is_number(rod.length) and rod.tails.shape == (*rod.headings.shape, 2)):
+        raise ValueError("no path of a rod")
+    return RodBound(**{**data, "path": rod})

@@ -71,7 +71,8 @@ class MotionCache:
                 f"Expected a motion of links of {arm.link_length:g} {maze.units}, got one of links of "
                 f"{motion.link_length:g}."
             )
-        self._keep(maze_key(maze), motion.with_links(int(arm.n_links or motion.n_links)))
+        motion = motion.with_links(int(arm.n_links or motion.n_links)).of_arm(arm)
+        self._keep(maze_key(maze), motion)
 
     def _planned(self, maze: Maze, arm: ArmSpec) -> Motion | None:
         for margin in self.margins:
@@ -81,7 +82,7 @@ class MotionCache:
             except InputError:  # links too thick for the feeder, or too few for the motions that were found
                 continue
             if motion is not None:
-                return motion
+                return motion.of_arm(arm)
         return None
 
     def _keep(self, key: bytes, motion: Motion | None) -> None:

@@ -211,7 +211,7 @@ def _answer(question: Question, checker: Checker[Motion]) -> PlanningResult:
                 failure=candidate.failure,
                 timings=candidate.timings,
             )
-        motion = _with_wanted_links(candidate.motion, query.maze, query.arm)
+        motion = _with_wanted_links(candidate.motion, query.maze, query.arm).of_arm(query.arm)
         report = checker(motion)
     except Late:
         return PlanningResult(

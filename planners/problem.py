@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-import zipfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from types import MappingProxyType
 from typing import IO, Any, Generic, Protocol, TypeVar
@@ -13,10 +12,11 @@ from typing import IO, Any, Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hrsnake_env.arm import FloatArray, configuration_from_joints, joints_from_configuration
+from hrsnake_env.arm import ArmSpec, FloatArray, configuration_from_joints, joints_from_configuration
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
+from planners.reading import NotReadable, read_arrays
 
 __all__ = [
     "Attempt",
@@ -29,6 +29,7 @@ __all__ = [
     "Progress",
     "Result",
     "ValidationReport",
+    "motion_values",
     "read_motion_arrays",
     "write_motion_arrays",
 ]
@@ -37,6 +38,9 @@ Progress = Callable[[str, float], None]
 """Called with the name of a stage and the share of it that is done, in [0, 1]."""
 
 KEYS = ("joints", "joint_angles", "feed", "link_length", "base_pose")
+
+ARM_KEYS = ("link_radius", "joint_limit")
+"""What a motion file holds besides if the arm has it; in files without, links are thin and bend freely."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -57,11 +61,15 @@ class Motion:
         In maze units.
     base_pose : array-like, shape (3,)
         (x, y, heading) of the base, in maze units and rad.
+    link_radius : float
+        Of the arm that it was made for, in maze units.
+    joint_limit : float or None
+        Of that arm, in rad.
 
     Raises
     ------
     InputError
-        If shapes do not agree or a value is not finite.
+        If shapes do not agree, a value is not finite, or there is no such arm.
     """
 
     joints: FloatArray
@@ -69,6 +77,8 @@ class Motion:
     feed: FloatArray
     link_length: float
     base_pose: FloatArray
+    link_radius: float = 0.0
+    joint_limit: float | None = None
 
     def __post_init__(self) -> None:
         for key in ("joints", "joint_angles", "feed", "base_pose"):
@@ -91,6 +101,7 @@ class Motion:
             np.isfinite(getattr(self, key)).all() for key in ("joints", "joint_angles", "feed", "base_pose")
         ):
             raise InputError("Expected a motion of finite numbers, got NaN or infinity.")
+        _ = self.arm  # there is one
 
     def __repr__(self) -> str:
         return f"Motion({self.n_poses} poses, {self.n_links} links of {self.link_length:g})"
@@ -104,6 +115,22 @@ class Motion:
     def n_links(self) -> int:
         """Number of links, those that never leave the feeder included."""
         return int(self.joint_angles.shape[1])
+
+    @property
+    def arm(self) -> ArmSpec:
+        """The arm that it was made for."""
+        return ArmSpec(
+            link_length=self.link_length,
+            n_links=self.n_links,
+            link_radius=self.link_radius,
+            joint_limit=self.joint_limit,
+        )
+
+    def of_arm(self, arm: ArmSpec) -> Motion:
+        """Return the same motion as one of links as thick, and of joints as limited, as those of an arm."""
+        if (arm.link_radius, arm.joint_limit) == (self.link_radius, self.joint_limit):
+            return self
+        return replace(self, link_radius=arm.link_radius, joint_limit=arm.joint_limit)
 
     @classmethod
     def from_configurations(
@@ -134,7 +161,8 @@ class Motion:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the motion as `.npz`, completely or not at all.
 
-        The keys are `joints`, `joint_angles`, `feed`, `link_length` and `base_pose`.
+        The keys are `joints`, `joint_angles`, `feed`, `link_length` and `base_pose`; where the arm has them
+        also `link_radius` and `joint_limit` (rad).
         """
         with replacing(path) as part, part.open("wb") as file:
             write_motion_arrays(file, self)
@@ -151,8 +179,7 @@ class Motion:
         values = read_motion_arrays(path)
         if values["joint_angles"].ndim == 3:
             raise InputError(f"Expected a motion in the plane in '{path}', got one in space.")
-        link_length = float(values.pop("link_length").item())
-        return cls(link_length=link_length, **values)
+        return cls(**values)
 
     def check_maze(self, maze: Maze) -> None:
         """Check that the motion starts from the base of this maze.
@@ -186,17 +213,19 @@ class Motion:
         if more == 0:
             return self
         joint_angles = np.pad(self.joint_angles, ((0, 0), (more, 0)))
-        return Motion.from_configurations(self.feed, joint_angles, self.link_length, self.base_pose)
+        longer = Motion.from_configurations(self.feed, joint_angles, self.link_length, self.base_pose)
+        return longer.of_arm(self.arm)
 
 
 def write_motion_arrays(file: IO[bytes], motion: object) -> None:
-    """Write the attributes `KEYS` of a motion as `.npz`."""
-    arrays: dict[str, Any] = {key: np.asarray(getattr(motion, key)) for key in KEYS}
+    """Write the attributes `KEYS` of a motion as `.npz`, and those of `ARM_KEYS` that its arm has."""
+    present = [key for key in ARM_KEYS if getattr(motion, key)]
+    arrays: dict[str, Any] = {key: np.asarray(getattr(motion, key)) for key in (*KEYS, *present)}
     np.savez_compressed(file, **arrays)
 
 
-def read_motion_arrays(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
-    """Read the arrays `KEYS` of a motion file (.npz).
+def read_motion_arrays(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read the arrays `KEYS` of a motion file (.npz), and those of `ARM_KEYS` that it has; scalars as floats.
 
     Raises
     ------
@@ -204,25 +233,41 @@ def read_motion_arrays(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
         If the file is missing or does not hold a motion.
     """
     try:
-        with open(path, "rb") as file:
-            data = np.load(file, allow_pickle=False)
-            if not isinstance(data, np.lib.npyio.NpzFile):
-                raise InputError(f"Expected a motion (.npz) in '{path}', got a single array.")
-            missing = [key for key in KEYS if key not in data]
-            if missing:
-                raise InputError(
-                    f"Expected a motion in '{path}' with the keys {', '.join(KEYS)}; "
-                    f"missing: {', '.join(missing)}."
-                )
-            values = {key: np.asarray(data[key]) for key in KEYS}  # a member may be no array at all
+        return motion_values(read_arrays(path), f" in '{path}'")
     except FileNotFoundError:
         raise InputError(f"Expected a motion file at '{path}', but there is none.") from None
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"Expected a motion (.npz) in '{path}', got a file that is not one.") from None
-    if any(values[key].dtype.kind not in "fiu" for key in KEYS) or values["link_length"].size != 1:
-        raise InputError(f"Expected a motion of numbers in '{path}', with one link_length.")
+    except NotReadable as got:
+        raise InputError(f"Expected a motion (.npz) in '{path}', got {got}.") from None
+
+
+def motion_values(arrays: Mapping[str, NDArray[Any]], where: str = "") -> dict[str, Any]:
+    """Check that arrays are those of a motion, in the plane or in space; return them, scalars as floats.
+
+    Parameters
+    ----------
+    arrays : mapping from str to array
+        Of an .npz file; others than a motion's are left out.
+    where : str
+        For messages.
+
+    Raises
+    ------
+    InputError
+        If one is missing, or is not made of numbers.
+    """
+    missing = [key for key in KEYS if key not in arrays]
+    if missing:
+        raise InputError(
+            f"Expected a motion{where} with the keys {', '.join(KEYS)}; missing: {', '.join(missing)}."
+        )
+    values: dict[str, Any] = {key: arrays[key] for key in (*KEYS, *ARM_KEYS) if key in arrays}
+    if any(array.dtype.kind not in "fiu" for array in values.values()):
+        raise InputError(f"Expected a motion of numbers{where}, with one link_length.")
+    for key in ("link_length", *ARM_KEYS):
+        if key in values:
+            if values[key].size != 1:
+                raise InputError(f"Expected a motion of numbers{where}, with one {key}.")
+            values[key] = float(values[key].item())
     return values
 
 

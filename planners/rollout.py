@@ -245,7 +245,7 @@ def simulate_motion(
     maze : Maze
         The maze.
     arm : ArmSpec, optional
-        Gives the link radius; by default 0.
+        Gives the link radius. By default the arm that the motion was made for.
     substeps : int
         Simulated steps per action.
     progress : callable, optional
@@ -258,7 +258,7 @@ def simulate_motion(
         exact.
     """
     motion.check_maze(maze)
-    spec = ArmSpec(link_length=motion.link_length) if arm is None else arm
+    spec = motion.arm if arm is None else arm
     spec = dataclasses.replace(spec, n_links=motion.n_links)
     # Absolute targets: after a collision the arm goes on along the motion, and not beside it.
     policy = PlannedPolicy(motion, action="absolute")

@@ -93,7 +93,7 @@ def validate(
     maze : Maze
         With the exact walls.
     arm : ArmSpec, optional
-        Gives link radius and joint limit. By default thin links without joint limits.
+        Gives link radius and joint limit. By default the arm that the motion was made for.
     progress : callable, optional
         Called with "validate" and the share that is done.
 
@@ -108,7 +108,7 @@ def validate(
     InputError
         If the motion belongs to another maze or another arm.
     """
-    arm = ArmSpec(link_length=motion.link_length) if arm is None else arm
+    arm = motion.arm if arm is None else arm
     _check_arm(motion, arm)
     motion.check_maze(maze)
     tell = progress if progress is not None else lambda stage, share: None

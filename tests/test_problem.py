@@ -70,7 +70,7 @@ def test_joints_and_configurations_make_the_same_motion():
         (lambda path: path.write_text("no motion"), "got a file that is not one"),
         (lambda path: path.write_bytes(b""), "got a file that is not one"),
         (lambda path: path.write_bytes(b"PK\x03\x04broken"), "got a file that is not one"),
-        (lambda path: path.mkdir(), "got a file that is not one"),
+        (lambda path: path.mkdir(), "got a folder or a device"),
         (
             lambda path: np.savez(path, joints=np.zeros((2, 3, 2))),
             "missing: joint_angles, feed, link_length, base_pose",

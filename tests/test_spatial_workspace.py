@@ -575,11 +575,11 @@ def test_a_base_on_the_wall_of_a_closed_side_is_taken_and_one_in_a_box_there_is_
         (lambda path: None, "Expected a workspace file at '{}', but there is none."),
         (
             lambda path: path.mkdir(),
-            "Expected a workspace file at '{}' that can be read, got: Is a directory.",
+            "Expected JSON in '{}', got a folder or a device.",
         ),
         (
             lambda path: path.write_bytes(b"\xff\xfe"),
-            "Expected text (UTF-8) in '{}', got a file that is none.",
+            "Expected JSON in '{}', got a file that is not: it is no text (UTF-8).",
         ),
         (
             lambda path: path.write_text("{"),

@@ -736,12 +736,12 @@ def _npy(array: Any) -> bytes:
     [
         (b"", "file that is not one"),
         (b"PK\x03\x04", "file that is not one"),
-        (_archive(joints=bytes(300 * 2**20)), "at most 256 MiB"),
-        (_archive(**{f"a{k}": b"" for k in range(20)}), "at most 256 MiB"),
+        (_archive(joints=bytes(300 * 2**20)), "more than 256 MiB when it is unpacked"),
+        (_archive(**{f"a{k}": b"" for k in range(1001)}), "more than 1000 members"),
         (_archive(joints=_npy(np.zeros(3))), "with the keys"),
         (
             _archive(**dict.fromkeys(("joints", "joint_angles", "feed", "link_length", "base_pose"), b"x")),
-            "of numbers",
+            "file that is not one",
         ),
         (
             _archive(

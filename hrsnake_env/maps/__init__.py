@@ -63,7 +63,7 @@ def read_map(
     path = PurePath(source)
     kind = ENDINGS.get(path.suffix.lower())
     if kind is None:
-        raise InputError(f"Unknown kind of map '{path.name}'. Available: {', '.join(ENDINGS)}.")
+        raise InputError(f"Unknown kind of map {path.name!r}. Available: {', '.join(ENDINGS)}.")
     module = importlib.import_module(f"hrsnake_env.maps.{kind}")
     read = getattr(module, f"read_{kind}")
     name, source_files = (

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime
 import importlib.metadata
-import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from planners.bench.methods import run_cell
 from planners.bench.pool import bar
 from planners.bench.records import machine, write_results
 from planners.bench.rows import check_pyarrow, read_rows, sorted_rows, write_rows
+from planners.reading import NotReadable, read_json, shown
 
 __all__ = ["ROWS", "StudyRun", "remaining", "run_cells", "worst_hours"]
 
@@ -152,13 +152,14 @@ def _opened(study: str, out: Path) -> Path:
     """Make the folder, refuse another study's, and take away what a killed run has half written."""
     folder = out / CELLS
     try:
-        known = json.loads((out / MANIFEST).read_text(encoding="utf-8"))["study"]
+        manifest = read_json(out / MANIFEST)
+        known, _ = manifest["study"], list(manifest["runs"])
     except FileNotFoundError:
         known = study
-    except (ValueError, KeyError, TypeError):
+    except (NotReadable, KeyError, TypeError):
         raise InputError(f"Expected the manifest of a study in '{out}', got something else.") from None
     if known != study:
-        raise InputError(f"Expected a folder for the study '{study}', but '{out}' holds '{known}'.")
+        raise InputError(f"Expected a folder for the study '{study}', but '{out}' holds {shown(known)}.")
     folder.mkdir(parents=True, exist_ok=True)
     for path in (*out.glob("*.part.*"), *folder.glob("*.part.*")):
         path.unlink(missing_ok=True)
@@ -199,7 +200,7 @@ def _merged(cells: Sequence[Cell], folder: Path) -> list[Any]:
 def _note(out: Path, study: str, engine: str, workers: int | None) -> None:
     """Add this run to the manifest: when, on which machine, with what."""
     path = out / MANIFEST
-    runs = json.loads(path.read_text(encoding="utf-8"))["runs"] if path.exists() else []
+    runs = read_json(path)["runs"] if path.exists() else []
     now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     this = {
         "started": now,

@@ -17,8 +17,12 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from hrsnake_env.errors import InputError
+from planners.reading import NotReadable, read_limited
 
 __all__ = ["Tell", "bar", "over_processes", "resumed", "worker_pool"]
+
+LINES_BYTES = 256 * 2**20
+"""Of a file of lines, each of which is small."""
 
 Tell = Callable[[], None]
 """Called when one more piece of work is done."""
@@ -138,12 +142,12 @@ def _read(path: Path) -> dict[str, dict[str, Any]]:
     """Read the lines by their task; a last line that was cut off is taken off the file."""
     if not path.exists():
         return {}
-    text = path.read_text(encoding="utf-8")
-    whole = text[: text.rfind("\n") + 1]
     try:
+        text = read_limited(path, LINES_BYTES).decode("utf-8")
+        whole = text[: text.rfind("\n") + 1]
         rows = [json.loads(line) for line in whole.splitlines()]
         done = {json.dumps(row["task"]): row for row in rows}
-    except (ValueError, KeyError, TypeError):
+    except (NotReadable, ValueError, KeyError, TypeError, RecursionError):
         raise InputError(
             f"Expected lines of JSON, each with its task, in '{path}', got something else."
         ) from None

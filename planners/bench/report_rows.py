@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import json
 import math
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -14,7 +13,8 @@ import numpy as np
 from hrsnake_env.errors import InputError
 from hrsnake_env.ladder import LADDER
 from planners.bench.campaign import MANIFEST, ROWS
-from planners.bench.rows import COLUMNS
+from planners.bench.rows import COLUMNS, check_size
+from planners.reading import NotReadable, read_json
 
 __all__ = [
     "METHODS",
@@ -106,8 +106,10 @@ def _read(path: Path) -> list[Row]:
         raise InputError(f"Expected a folder with {ROWS}, as a study writes it, but there is no '{path}'.")
     try:
         # Without Arrow's threads, as `rows.read_rows` has it.
-        table = parquet.ParquetFile(pyarrow.BufferReader(path.read_bytes())).read(use_threads=False)
-    except pyarrow.ArrowException as error:
+        file = parquet.ParquetFile(pyarrow.BufferReader(path.read_bytes()))
+        check_size(file.metadata)
+        table = file.read(use_threads=False)
+    except Exception as error:  # Arrow raises whatever its parsers stumble over
         raise InputError(f"Expected a Parquet file, but '{path}' is none: {error}.") from None
     if missing := [name for name in COLUMNS if name not in table.column_names]:
         raise InputError(f"Expected rows of a study, but '{path}' has no column {', '.join(missing)}.")
@@ -116,7 +118,7 @@ def _read(path: Path) -> list[Row]:
     )
     try:
         rows: list[Row] = table.select(list(COLUMNS)).cast(schema).to_pylist()
-    except (pyarrow.ArrowException, ValueError) as error:
+    except Exception as error:
         raise InputError(f"Expected columns of the types of a study in '{path}', got: {error}.") from None
     return rows
 
@@ -126,11 +128,11 @@ def machines(folders: Sequence[Path]) -> list[str]:
     found: dict[str, None] = {}
     for folder in folders:
         try:
-            for run in json.loads((folder / MANIFEST).read_text(encoding="utf-8"))["runs"]:
+            for run in read_json(folder / MANIFEST)["runs"]:
                 machine = run["machine"]
                 named = f"{machine['cores']} cores of {machine['processor']}"
                 found[f"{named}, Python {machine['python']}, {run['workers']} at a time"] = None
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, NotReadable, KeyError, TypeError):
             continue  # it only adds to what the rows tell
     return list(found)
 

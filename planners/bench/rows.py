@@ -15,6 +15,7 @@ __all__ = [
     "ORDER",
     "TIMES",
     "check_pyarrow",
+    "check_size",
     "read_rows",
     "sorted_rows",
     "whole_row",
@@ -56,6 +57,9 @@ COLUMNS: dict[str, str] = {
 
 NULLABLE = ("success", "clean", "steps", "return", "progress", "worst_depth", "collisions", "pinches")
 """Columns that are null where no episode was simulated."""
+
+MOST_ROWS, TABLE_BYTES = 10**6, 256 * 2**20
+"""Of one file, unpacked."""
 
 ORDER = ("study", "task", "method", "seed", "actions", "episode")
 """By which rows are sorted; no two rows agree in all of them."""
@@ -123,13 +127,31 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     try:
         # Without Arrow's threads: they may abort the process at its end.
         file = parquet.ParquetFile(arrow.BufferReader(path.read_bytes()))
-        table = file.read(use_threads=False)
-    except arrow.ArrowInvalid:
+        check_size(file.metadata)
+        if file.schema_arrow.names != list(COLUMNS):
+            raise InputError(f"Expected the columns of a benchmark's rows in '{path}', got others.")
+        schema = arrow.schema(
+            [(name, arrow.type_for_alias(kind), name in NULLABLE) for name, kind in COLUMNS.items()]
+        )
+        rows: list[dict[str, Any]] = file.read(use_threads=False).cast(schema).to_pylist()
+    except InputError:
+        raise
+    except Exception:  # Arrow raises whatever its parsers stumble over
         raise InputError(f"Expected rows of a benchmark (Parquet) in '{path}', got something else.") from None
-    if table.column_names != list(COLUMNS):
-        raise InputError(f"Expected the columns of a benchmark's rows in '{path}', got others.")
-    rows: list[dict[str, Any]] = table.to_pylist()
     return rows
+
+
+def check_size(metadata: Any) -> None:
+    """Refuse a Parquet file that would be too large when it is unpacked.
+
+    Raises
+    ------
+    ValueError
+        If it is so.
+    """
+    groups = [metadata.row_group(number) for number in range(metadata.num_row_groups)]
+    if metadata.num_rows > MOST_ROWS or sum(group.total_byte_size for group in groups) > TABLE_BYTES:
+        raise ValueError(f"more than {MOST_ROWS} rows or {TABLE_BYTES // 2**20} MiB when it is unpacked")
 
 
 def check_pyarrow() -> None:

@@ -238,7 +238,7 @@ def export(
     maze : Maze or Workspace
         Of the motion's kind.
     arm : ArmSpec, optional
-        Gives link radius and joint limit. By default thin links without joint limits.
+        Gives link radius and joint limit. By default the arm that the motion was made for.
     format : str
         A name in `EXPORTS`.
     limits : TrajectoryLimits, optional
@@ -267,7 +267,7 @@ def export(
     if not entry.in_space and not isinstance(motion, Motion):
         possible = ", ".join(name for name, other in EXPORTS.items() if other.in_space)
         raise InputError(f"Expected one of {possible} for a motion in space, got '{format}'.")
-    arm = ArmSpec(link_length=motion.link_length) if arm is None else arm
+    arm = motion.arm if arm is None else arm
     limits = TrajectoryLimits() if limits is None else limits
     job = _Job(
         motion=motion,

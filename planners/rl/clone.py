@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from hrsnake_env.arguments import check_at_least, check_one_of, is_number
 from hrsnake_env.errors import InputError
 from planners.demonstrator import Demonstrator
+from planners.reading import read_arrays
 from planners.rl.checkpoints import read_model, write_checkpoint
 from planners.rl.environments import make_env
 from planners.rl.evaluate import evaluate
@@ -69,6 +70,10 @@ LOG_STD = -5.0
 """Of sampled actions. In Fig19 with -3 none of 20 episodes comes through, where mean actions do."""
 
 
+LESSONS_BYTES = 2**30
+"""That lessons in a checkpoint may take when they are unpacked."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Lessons:
     """Hold what a pupil has been taught, and what it has learnt from it.
@@ -101,7 +106,9 @@ class Lessons:
     @classmethod
     def load(cls, file: IO[bytes]) -> Lessons:
         """Read what `save` has written."""
-        data = dict(np.load(file, allow_pickle=False))
+        data = read_arrays(file, most_bytes=LESSONS_BYTES)
+        if any(array.dtype.kind not in "fi" for array in data.values()):
+            raise InputError("Expected lessons in numbers, got something else.")
         n_rounds, round_steps = map(int, data["counts"])
         layers = tuple((data[f"weights_{k}"], data[f"bias_{k}"]) for k in range((len(data) - 3) // 2))
         return cls(
@@ -197,7 +204,7 @@ class _School:
         old = old_progress(checkpoint, task, resume)
         folder.mkdir(parents=True, exist_ok=True)
         progress = old or Progress()
-        lessons = self._first(total) if old is None else read_model(checkpoint, Lessons.load)
+        lessons = self._first(total) if old is None else self._resumed(checkpoint)
         cpu, wall = progress.cpu_seconds - time.process_time(), progress.seconds - time.monotonic()
         while progress.steps < total and not self._learnt(progress, stop_at) and not self._stop.asked:
             more = self._round(lessons, progress)
@@ -225,6 +232,21 @@ class _School:
         observations, actions = (np.zeros((0, width), dtype=np.float32) for width in widths)
         steps = max(-(-total // ROUNDS), LEAST_STEPS)
         return Lessons(observations=observations, actions=actions, layers=(), n_rounds=0, round_steps=steps)
+
+    def _resumed(self, checkpoint: Path) -> Lessons:
+        """Return the lessons of a checkpoint, if they are of this environment."""
+        lessons: Lessons = read_model(checkpoint, Lessons.load)
+        first = self._first(1)
+        counts = len(lessons.observations) == len(lessons.actions) and min(
+            lessons.n_rounds, lessons.round_steps
+        )
+        if not counts or any(
+            getattr(lessons, key).shape[1:] != getattr(first, key).shape[1:]
+            for key in ("observations", "actions")
+        ):
+            raise InputError(f"Expected lessons in {self.settings.env_id} in '{checkpoint}', got others.")
+        self._policy(lessons.layers)  # refuses layers that do not fit
+        return lessons
 
     def _policy(self, layers: Layers, steps: int = 0) -> NetworkPolicy:
         *hidden, mean = layers

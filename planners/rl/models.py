@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hrsnake_env.errors import InputError
-from planners.rl.checkpoints import read_model
+from planners.rl.checkpoints import read_model, restore
 from planners.rl.environments import decision_steps, make_env
 from planners.rl.settings import Settings
 
@@ -78,12 +78,8 @@ def new_model(settings: Settings, envs: Any, seed: int, folder: Path) -> Any:
 
 def resumed_model(settings: Settings, envs: Any, seed: int, checkpoint: Path) -> Any:
     """Return the model of the checkpoint, with random numbers that it has not yet drawn."""
-    model = read_model(
-        checkpoint,
-        lambda file: _class(settings).load(
-            file, env=envs, device="cpu", tensorboard_log=_logs(checkpoint.parent)
-        ),
-    )
+    new = new_model(settings, envs, seed, checkpoint.parent)
+    model = read_model(checkpoint, lambda file: restore(new, file))
     own = np.random.SeedSequence((seed, model.num_timesteps)).generate_state(1)[0]
     model.set_random_seed(int(own) % 2**31)
     return model

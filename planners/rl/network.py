@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
+from planners.reading import NotReadable, read_arrays, shown
 from planners.rl.environments import make_env
 from planners.rl.origin import Origin
 
@@ -69,7 +69,8 @@ class NetworkPolicy:
 
     def __post_init__(self) -> None:
         if self.activation not in ACTIVATIONS:
-            raise InputError(f"Unknown activation {self.activation!r}. Available: {', '.join(ACTIVATIONS)}.")
+            names = ", ".join(ACTIVATIONS)
+            raise InputError(f"Unknown activation {shown(self.activation)}. Available: {names}.")
         width = sum(length for _, length in self.observation)
         for weights, bias in self.hidden:
             width = _check_layer(weights, bias, width)
@@ -189,11 +190,8 @@ class NetworkPolicy:
             If the file is missing or does not hold a policy.
         """
         try:
-            with open(path, "rb") as file:
-                data = dict(np.load(file, allow_pickle=False))
+            data = read_arrays(path)
             meta = json.loads(str(data.pop("meta")))
-            origin = dict(meta["origin"])
-            origin["wrappers"] = tuple((name, kwargs) for name, kwargs in origin["wrappers"])
             layers = [(data[f"weights_{k}"], data[f"bias_{k}"]) for k in range(len(data) // 2)]
             *hidden, mean, spread = layers
             return cls(
@@ -203,13 +201,15 @@ class NetworkPolicy:
                 activation=meta["activation"],
                 squash=bool(meta["squash"]),
                 observation=tuple((str(name), int(length)) for name, length in meta["observation"]),
-                origin=Origin(**origin),
+                origin=Origin.from_dict(meta["origin"]),
             )
         except FileNotFoundError:
             raise InputError(f"Expected a policy (.npz) at '{path}', but there is none.") from None
         except InputError as error:
             raise InputError(f"Expected a policy (.npz) in '{path}': {error}") from None
-        except (OSError, ValueError, EOFError, KeyError, TypeError, zipfile.BadZipFile):
+        except NotReadable as got:
+            raise InputError(f"Expected a policy (.npz) in '{path}', got {got}.") from None
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
             raise InputError(f"Expected a policy (.npz) in '{path}', got a file that is not one.") from None
 
     @classmethod
@@ -296,6 +296,10 @@ def _layer(state: dict[str, Float32], name: str) -> tuple[Float32, Float32]:
 
 def _check_layer(weights: Float32, bias: Float32, width: int) -> int:
     """Return how many numbers come out of a layer that so many go into."""
+    if weights.dtype.kind != "f" or bias.dtype.kind != "f":
+        raise InputError(f"Expected weights in numbers, got {weights.dtype} and {bias.dtype}.")
+    if weights.ndim != 2 or bias.ndim != 1:
+        raise InputError(f"Expected weights with shape (n_out, n_in), got {weights.shape} and {bias.shape}.")
     if weights.shape != (*bias.shape, width):
         raise InputError(
             f"Expected layers that fit each other, got weights with shape {weights.shape} after {width} "

@@ -93,7 +93,7 @@ def old_progress(checkpoint: Path, task: dict[str, Any], resume: bool) -> Progre
         )
     old = read_progress(checkpoint)
     try:
-        its, progress = dict(old["task"]), Progress(**old["progress"])
+        its, progress = dict(old["task"]), Progress.from_dict(old["progress"])
     except (KeyError, TypeError, ValueError):
         raise InputError(f"Expected a checkpoint of this version in '{checkpoint}', got another.") from None
     for key, value in task.items():

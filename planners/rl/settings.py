@@ -12,6 +12,7 @@ from typing import Any
 from hrsnake_env.arguments import check_at_least, is_number
 from hrsnake_env.errors import InputError
 from hrsnake_env.registration import ENVIRONMENTS
+from planners.reading import NotReadable, read_limited, shown
 from planners.rl.environments import TRAINING_KWARGS, TRAINING_ONLY, WRAPPERS, Wrappers, check_env_id
 
 __all__ = ["CLONING", "FIRST_SEED", "METHODS", "Settings", "load_settings", "settings_file"]
@@ -24,6 +25,9 @@ CLONING = ("clone", "dagger")
 
 FIRST_SEED = 1_000_000
 """Of the first episode of an evaluation, far from those that trainings begin with."""
+
+SETTINGS_BYTES, MOST_VALUES = 2**20, 20_000
+"""Of a file of settings."""
 
 FOLDER = Path(__file__).parent / "hyperparams"
 
@@ -185,7 +189,7 @@ def load_settings(method: str, env_id: str, *, file: str | os.PathLike[str] | No
     entries = _read(path)
     for name in entries:
         if name != "default" and name not in ENVIRONMENTS:
-            raise InputError(f"Expected environments and 'default' in '{path}', got {name!r}.")
+            raise InputError(f"Expected environments and 'default' in '{path}', got {shown(name)}.")
     if env_id not in entries and "default" not in entries:
         raise InputError(f"Expected settings for {env_id!r} or 'default' in '{path}', but there are none.")
     # A file is refused as a whole: a slip in one entry is found before another run needs it.
@@ -200,14 +204,40 @@ def _read(path: Path) -> dict[str, Any]:
     except ImportError:
         raise InputError('Expected PyYAML to be installed: pip install "hrsnake[rl]".') from None
     try:
-        entries = yaml.safe_load(path.read_text(encoding="utf-8"))
+        text = read_limited(path, SETTINGS_BYTES).decode("utf-8")
+        if _weight(yaml.compose(text, Loader=yaml.SafeLoader), {}) > MOST_VALUES:
+            raise InputError(
+                f"Expected at most {MOST_VALUES} values in '{path}', references counted, got more."
+            )
+        entries = yaml.safe_load(text)
     except FileNotFoundError:
         raise InputError(f"Expected a file of settings (.yml) at '{path}', but there is none.") from None
-    except (OSError, UnicodeDecodeError, yaml.YAMLError):
+    except (
+        OSError,
+        NotReadable,
+        ValueError,
+        TypeError,
+        OverflowError,
+        RecursionError,
+        yaml.YAMLError,
+    ) as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"Expected settings (.yml) in '{path}', got a file that is not YAML.") from None
     if not isinstance(entries, dict):
         raise InputError(f"Expected settings by environment in '{path}', got {type(entries).__name__}.")
     return entries
+
+
+def _weight(node: Any, known: dict[int, float]) -> float:
+    """Return how many values a node of YAML stands for: a few references can stand for any number."""
+    if not isinstance(getattr(node, "value", None), list):
+        return 1.0
+    if id(node) not in known:
+        known[id(node)] = math.inf  # if it refers to itself
+        inner = (each for child in node.value for each in (child if isinstance(child, tuple) else (child,)))
+        known[id(node)] = 1.0 + sum(_weight(each, known) for each in inner)
+    return known[id(node)]
 
 
 def _settings(path: Path, method: str, name: str, entry: Any) -> Settings:
@@ -218,10 +248,10 @@ def _settings(path: Path, method: str, name: str, entry: Any) -> Settings:
     known = (*OWN_KEYS, *ARGUMENTS[ALGORITHMS[method]])
     for key in entry:
         if key not in known:
-            raise InputError(f"Unknown setting {key!r} {where}. Available: {', '.join(known)}.")
+            raise InputError(f"Unknown setting {shown(key)} {where}. Available: {', '.join(known)}.")
     for key in MAPPINGS:
         if not isinstance(entry.get(key, {}), dict):
-            raise InputError(f"Expected {key} {where} as names with values, got {entry[key]!r}.")
+            raise InputError(f"Expected {key} {where} as names with values, got {shown(entry[key])}.")
     for key in ("n_timesteps", "n_envs"):
         if key in entry or key == "n_timesteps":
             check_at_least(f"{key} {where}", entry.get(key), 1, whole=True)
@@ -229,17 +259,21 @@ def _settings(path: Path, method: str, name: str, entry: Any) -> Settings:
         _check_schedule(f"{key} {where}", entry.get(key, 0.1))
     for key, value in entry.items():
         if key in NUMBERS and not is_number(value):
-            raise InputError(f"Expected {key} {where} as a number, got {value!r}.")
+            raise InputError(f"Expected {key} {where} as a number, got {shown(value)}.")
     if entry.get("replay_buffer_class", BUFFERS[0]) not in BUFFERS:
         raise InputError(
-            f"Unknown replay_buffer_class {entry['replay_buffer_class']!r} {where}. "
+            f"Unknown replay_buffer_class {shown(entry['replay_buffer_class'])} {where}. "
             f"Available: {', '.join(BUFFERS)}."
         )
     if entry.get("policy", "MlpPolicy") not in POLICIES:
-        raise InputError(f"Unknown policy {entry['policy']!r} {where}. Available: {', '.join(POLICIES)}.")
+        raise InputError(
+            f"Unknown policy {shown(entry['policy'])} {where}. Available: {', '.join(POLICIES)}."
+        )
     for key in entry.get("policy_kwargs", {}):
         if key not in POLICY_KWARGS:
-            raise InputError(f"Unknown policy_kwargs {key!r} {where}. Available: {', '.join(POLICY_KWARGS)}.")
+            raise InputError(
+                f"Unknown policy_kwargs {shown(key)} {where}. Available: {', '.join(POLICY_KWARGS)}."
+            )
     return Settings(
         method=method,
         env_id=name,
@@ -256,7 +290,7 @@ def _check_schedule(what: str, value: Any) -> None:
     except ValueError:
         number = value
     if not (is_number(number) and 0.0 < number < math.inf):
-        raise InputError(f"Expected {what} as a positive number (0.0003) or lin_0.0003, got {value!r}.")
+        raise InputError(f"Expected {what} as a positive number (0.0003) or lin_0.0003, got {shown(value)}.")
 
 
 def _wrappers(where: str, value: Any) -> Wrappers:
@@ -267,6 +301,6 @@ def _wrappers(where: str, value: Any) -> Wrappers:
         pairs = list(item.items()) if isinstance(item, dict) else [(item, {})]
         named = len(pairs) == 1 and isinstance(pairs[0][0], str) and pairs[0][0] in WRAPPERS
         if not named or not isinstance(pairs[0][1], dict):
-            raise InputError(f"Unknown env_wrapper {item!r} {where}. Available: {', '.join(WRAPPERS)}.")
+            raise InputError(f"Unknown env_wrapper {shown(item)} {where}. Available: {', '.join(WRAPPERS)}.")
         wrappers.append(pairs[0])
     return tuple(wrappers)

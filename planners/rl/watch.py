@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bars
 
+from hrsnake_env.arguments import check_at_least
 from planners.wrappers import AT_BASE
 
 __all__ = ["Progress", "Stop", "Tell", "Watch", "stop_on_interrupt", "training_bar"]
@@ -88,6 +89,31 @@ class Progress:
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON."""
         return asdict(self)
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Progress:
+        """Build it from what `to_dict` returned.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If something is missing, unknown or of another kind.
+        """
+        progress = cls(**data)
+        lists = (progress.recent, progress.recent_planned, progress.curve)
+        if not all(isinstance(each, list) for each in lists):
+            raise TypeError("no lists")
+        for count in (progress.steps, progress.episodes):
+            check_at_least("a count", count, 0, whole=True)
+        for what in (
+            progress.cpu_seconds,
+            progress.seconds,
+            *(number for point in progress.curve for number in point),
+        ):
+            check_at_least("a time or a share", what, 0)
+        if not all(isinstance(each, bool) for each in (*progress.recent, *progress.recent_planned)):
+            raise TypeError("no truth values")
+        return progress
 
 
 def _share(window: list[bool]) -> float | None:

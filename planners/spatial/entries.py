@@ -12,6 +12,7 @@ import numpy as np
 from hrsnake_env.arguments import is_number, numbers
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.errors import InputError
+from planners.reading import shown
 
 __all__ = [
     "boxes_of",
@@ -28,6 +29,9 @@ __all__ = [
     "unit_of",
     "vector_of",
 ]
+
+LONG = 200
+"""Characters of a value from which on it is cut."""
 
 
 def store(record: Any, key: str, array: FloatArray) -> None:
@@ -46,6 +50,7 @@ def vector_of(value: Any, what: str) -> FloatArray:
     # NumPy takes True and "1" for numbers.
     if vector.shape != (3,) or not np.isfinite(vector).all() or not all(map(is_number, value)):
         came = " ".join(repr(value).split())
+        came = came if len(came) < LONG else shown(value)
         raise InputError(f"Expected {what} as three finite numbers (x, y, z), got {came}.")
     return vector
 
@@ -111,7 +116,7 @@ def check_keys(data: Any, what: str, known: tuple[str, ...], needed: tuple[str, 
             raise InputError(f"Expected {what} with '{key}', but it has none.")
     for key in data:
         if key not in known:
-            raise InputError(f"Unknown key {key!r} of {what}. Available: {', '.join(known)}.")
+            raise InputError(f"Unknown key {shown(key)} of {what}. Available: {', '.join(known)}.")
 
 
 def list_of(data: Any, what: str) -> list[Any]:
@@ -130,8 +135,8 @@ def corners_of(data: Any, what: str) -> list[FloatArray]:
 def kind_of(data: Any) -> str:
     """Say what came, for people."""
     if isinstance(data, dict):
-        return f"an object of type {data['type']!r}" if "type" in data else "an object without a type"
-    return {list: "a list", str: "a text", type(None): "nothing"}.get(type(data), f"{data!r}")
+        return f"an object of type {shown(data['type'])}" if "type" in data else "an object without a type"
+    return {list: "a list", str: "a text", type(None): "nothing"}.get(type(data), shown(data))
 
 
 def point_text(point: Sequence[float] | FloatArray) -> str:

@@ -150,7 +150,7 @@ def _answer(name: str, query: SpatialQuery, checker: Checker[SpatialMotion]) -> 
                 failure=candidate.failure,
                 track=candidate.track,
             )
-        motion = _with_wanted_links(candidate.motion, query)
+        motion = _with_wanted_links(candidate.motion, query).of_arm(query.arm)
         report = checker(motion)
     except Late:
         return SpatialResult(

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hrsnake_env.arguments import is_number
-from hrsnake_env.arm import FloatArray
+from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
 from planners.problem import Failure, PlanningStatus, Result, read_motion_arrays, write_motion_arrays
@@ -40,11 +39,15 @@ class SpatialMotion:
         In workspace units.
     base_pose : array-like, shape (6,)
         Position and unit heading of the base.
+    link_radius : float
+        Of the arm that it was made for, in workspace units.
+    joint_limit : float or None
+        Of that arm, in rad.
 
     Raises
     ------
     InputError
-        If shapes do not agree or a value is not finite.
+        If shapes do not agree, a value is not finite, or there is no such arm.
     """
 
     joints: FloatArray
@@ -52,6 +55,8 @@ class SpatialMotion:
     feed: FloatArray
     link_length: float
     base_pose: FloatArray
+    link_radius: float = 0.0
+    joint_limit: float | None = None
 
     def __post_init__(self) -> None:
         for key in ("joints", "joint_angles", "feed", "base_pose"):
@@ -78,6 +83,7 @@ class SpatialMotion:
             raise InputError(
                 f"Expected a base_pose with a heading of length 1, got {self.base_pose[3:].tolist()}."
             )
+        _ = self.arm  # there is one
 
     def __repr__(self) -> str:
         return f"SpatialMotion({self.n_poses} poses, {self.n_links} links of {self.link_length:g})"
@@ -91,6 +97,22 @@ class SpatialMotion:
     def n_links(self) -> int:
         """Number of links, those that never leave the feeder included."""
         return int(self.joint_angles.shape[1])
+
+    @property
+    def arm(self) -> ArmSpec:
+        """The arm that it was made for."""
+        return ArmSpec(
+            link_length=self.link_length,
+            n_links=self.n_links,
+            link_radius=self.link_radius,
+            joint_limit=self.joint_limit,
+        )
+
+    def of_arm(self, arm: ArmSpec) -> SpatialMotion:
+        """Return the same motion as one of links as thick, and of joints as limited, as those of an arm."""
+        if (arm.link_radius, arm.joint_limit) == (self.link_radius, self.joint_limit):
+            return self
+        return replace(self, link_radius=arm.link_radius, joint_limit=arm.joint_limit)
 
     @classmethod
     def from_configurations(
@@ -118,7 +140,7 @@ class SpatialMotion:
         )
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the motion as `.npz`, completely or not at all, with the keys of its attributes."""
+        """Write the motion as `.npz`, completely or not at all; the keys are those of a planar one."""
         with replacing(path) as part, part.open("wb") as file:
             write_motion_arrays(file, self)
 
@@ -131,10 +153,10 @@ class SpatialMotion:
         InputError
             If the file is missing or does not hold a spatial motion.
         """
-        values: dict[str, Any] = read_motion_arrays(path)
+        values = read_motion_arrays(path)
         if values["joint_angles"].ndim == 2:
             raise InputError(f"Expected a motion in space in '{path}', got one in the plane.")
-        return cls(link_length=float(values.pop("link_length").item()), **values)
+        return cls(**values)
 
     def check_workspace(self, workspace: Workspace) -> None:
         """Check that the motion starts from the base of this workspace.
@@ -168,7 +190,8 @@ class SpatialMotion:
         if more == 0:
             return self
         joint_angles = np.pad(self.joint_angles, ((0, 0), (more, 0), (0, 0)))
-        return SpatialMotion.from_configurations(self.feed, joint_angles, self.link_length, self.base_pose)
+        longer = SpatialMotion.from_configurations(self.feed, joint_angles, self.link_length, self.base_pose)
+        return longer.of_arm(self.arm)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -68,7 +68,7 @@ def validate(
     workspace : Workspace
         With the exact obstacles.
     arm : ArmSpec, optional
-        Gives link radius and joint limit. By default thin links without joint limits.
+        Gives link radius and joint limit. By default the arm that the motion was made for.
     progress : callable, optional
         Called with "validate" and the share that is done.
 
@@ -84,7 +84,7 @@ def validate(
     InputError
         If the motion belongs to another workspace or another arm.
     """
-    arm = ArmSpec(link_length=motion.link_length) if arm is None else arm
+    arm = motion.arm if arm is None else arm
     _check_arm(motion, arm)
     motion.check_workspace(workspace)
     tell = progress if progress is not None else lambda stage, share: None

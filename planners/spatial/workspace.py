@@ -13,6 +13,7 @@ import numpy as np
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
+from planners.reading import NotReadable, read_json
 from planners.spatial.entries import (
     boxes_of,
     check_keys,
@@ -263,17 +264,15 @@ class Workspace:
         """
         path = Path(source)
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
+            data = read_json(path)
         except FileNotFoundError:
             raise InputError(f"Expected a workspace file at '{path}', but there is none.") from None
         except OSError as error:
             raise InputError(
                 f"Expected a workspace file at '{path}' that can be read, got: {error.strerror}."
             ) from None
-        except UnicodeDecodeError:
-            raise InputError(f"Expected text (UTF-8) in '{path}', got a file that is none.") from None
-        except (ValueError, RecursionError) as error:
-            raise InputError(f"Expected JSON in '{path}', got a file that is not: {error}.") from None
+        except NotReadable as got:
+            raise InputError(f"Expected JSON in '{path}', got {got}.") from None
         return cls.from_dict(data, default_name=path.stem)
 
     @classmethod
