@@ -45,6 +45,7 @@ from planners.cli_tools import (
     progress_bars,
     radians,
 )
+from planners.interrupts import careful_interrupts
 from planners.length_trials import motion_path
 from planners.planning import TIME_BUDGET, plan
 from planners.problem import Motion, PlanningResult, Progress
@@ -382,7 +383,8 @@ app.add_typer(bench_app, name="bench", rich_help_panel=MORE)
 def main() -> None:
     """Run the command line: one sentence on stderr and exit code 2 for bad input, no traceback."""
     try:
-        code = app(prog_name="hrsnake", standalone_mode=False)
+        with careful_interrupts():
+            code = app(prog_name="hrsnake", standalone_mode=False)
     except InputError as error:
         sys.exit(_complain(str(error)))
     except UsageError as error:
