@@ -1,7 +1,7 @@
-"""Ctrl-C at any moment of every long command: exit code 130, one sentence, no traceback, no half-written file.
+"""Ctrl-C at any moment of every long command: exit code 130, one sentence, no half-written file.
 
-Each command runs once in peace; then COUNT times it gets SIGINT, as its whole process group gets it from a
-terminal. It must end by itself, within seconds, with 130, or with its own code if it was done before.
+Each command runs once in peace; then COUNT times it gets SIGINT, as its whole process group gets it from
+a terminal. It must end by itself, within seconds, with 130, or with its own code if it was done before.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def campaign(count, seed, names, bar):
     figures = {}
     with tempfile.TemporaryDirectory(prefix="hrsnake-ctrl-c-") as place:
         base = Path(place).resolve()
-        warm(base)
+        warm(base, with_training="train" in names)
         for name in names:
             task = bar.add_task(name, total=count)
             peace = base / "peace" / name

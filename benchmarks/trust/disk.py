@@ -1,7 +1,7 @@
 """Every command that writes, where it cannot: one sentence, exit code 2, the old file intact, no half one.
 
-The disk is full (a small tmpfs where mounting is allowed, and a limit of the size of files), the folder or the
-file is read-only, missing, of another kind, or its name is too long.
+The disk is full (a small tmpfs where mounting is allowed, and a limit of the size of files), the folder or
+the file is read-only, missing, of another kind, or its name is too long.
 """
 
 from __future__ import annotations
@@ -32,7 +32,10 @@ FILES = {
     "simulate --replay": ("simulate straight {motion} --replay {out}", ".html"),
     "simulate --out": ("simulate straight {motion} --out {out}", ".gif"),
     **{
-        f"export {ending}": (f"export straight {{motion}} --metres-per-unit 0.001 --out {{out}} {FAST}", ending)
+        f"export {ending}": (
+            f"export straight {{motion}} --metres-per-unit 0.001 --out {{out}} {FAST}",
+            ending,
+        )
         for ending in (".csv", ".json", ".npz", ".yaml", ".urdf", ".gif", ".mp4", ".html")
     },
     "draw png": ("draw straight {motion} --out {out}", ".png"),
@@ -103,7 +106,11 @@ def ways(name, place):
     yield "full", full, lambda: None
     yield "limit of size", old, limited
     yield "read-only folder", lambda: (old(), closed())[1], nobody
-    yield "no such folder", lambda: place / "none" / "deep" / f"a{ending}" if is_file else "/proc/none/a", nobody
+    yield (
+        "no such folder",
+        lambda: place / "none" / "deep" / f"a{ending}" if is_file else "/proc/none/a",
+        nobody,
+    )
     if is_file:
         yield "read-only file", lambda: (old().chmod(0o444), place.chmod(0o777), out)[2], nobody
         yield "a folder", lambda: (out.mkdir(), out)[1], lambda: None
@@ -154,7 +161,7 @@ def campaign(names, bar):
         base.chmod(0o755)
         (base / "here").mkdir()
         (base / "here").chmod(0o777)
-        warm(base)
+        warm(base, with_training="train --out" in names)
         task = bar.add_task("disk", total=len(names))
         for name in names:
             for k in range(len(list(ways(name, base)))):

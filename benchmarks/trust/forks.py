@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
 import signal
@@ -86,10 +87,8 @@ class Child:
 
     def send(self, number, group=True):
         """Send a signal to it, or to all its processes."""
-        try:
+        with contextlib.suppress(ProcessLookupError):
             (os.killpg if group else os.kill)(self.pid, number)
-        except ProcessLookupError:
-            pass
 
     def left(self, seconds=20.0):
         """Tell whether processes of its group are still there after it has ended, and end them."""

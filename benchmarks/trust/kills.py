@@ -1,8 +1,8 @@
-"""Kill -9 amid `longest`, `bench`, `train`, `dataset` and `export`: nothing is lost, nothing half is taken for whole.
+"""Kill -9 amid `longest`, `bench`, `train`, `dataset` and `export`: nothing is lost, no half file is read.
 
-Each command runs once in peace, then COUNT times in a folder of its own, where it is killed: half the times at
-any moment, half at a moment at which it writes. Then all files must be whole, no process may be left, and the
-same command, run again, must end with the same results as in peace, with no other file beside them.
+Each command runs once in peace, then COUNT times in a folder of its own, where it is killed: half the times
+at any moment, half at a moment at which it writes. Then all files must be whole, no process may be left, and
+the same command, run again, must end with the same results as in peace, with no other file beside them.
 """
 
 from __future__ import annotations
@@ -60,7 +60,9 @@ class Longest:
     name = "longest --state"
 
     def arguments(self, folder, rng):
-        return "longest straight --accuracy 0.03 --time-budget 600 --state s.json --json".split()
+        """Return the words of the command."""
+        words = "longest straight --accuracy 0.03 --time-budget 600 --state s.json --json"
+        return words.split()
 
     def facts(self, folder):
         """Read everything, as the next run does; return what must be the same."""
@@ -83,9 +85,12 @@ class Bench:
     name = "bench ladder"
 
     def arguments(self, folder, rng):
-        return "bench ladder --methods track,sweep --tasks straight,bend-i30 --workers 2 --out o".split()
+        """Return the words of the command."""
+        words = "bench ladder --methods track,sweep --tasks straight,bend-i30 --workers 2 --out o"
+        return words.split()
 
     def facts(self, folder):
+        """Read what is there; return the results, None before there are any."""
         from planners.bench.rows import TIMES as ROW_TIMES
         from planners.bench.rows import read_rows
 
@@ -106,10 +111,12 @@ class Train:
     name = "train --resume"
 
     def arguments(self, folder, rng):
+        """Return the words of the command."""
         words = "train HyperRedundantMaze-Straight-v0 --method dagger --steps 1200 --stop-at 2 --out r --json"
         return [*words.split(), "--resume"]
 
     def facts(self, folder):
+        """Read what is there; return the results, None before there are any."""
         from planners.rl.checkpoints import read_model, read_progress
         from planners.rl.clone import Lessons
 
@@ -128,11 +135,21 @@ class Dataset:
     name = "dataset"
 
     def arguments(self, folder, rng):
-        return (
-            "dataset arm/peace-v0 --env HyperRedundantMaze-Straight-v0 --episodes 2 --path d --json".split()
-        )
+        """Return the words of the command."""
+        return [
+            "dataset",
+            "arm/peace-v0",
+            "--env",
+            "HyperRedundantMaze-Straight-v0",
+            "--episodes",
+            "2",
+            "--path",
+            "d",
+            "--json",
+        ]
 
     def facts(self, folder):
+        """Read what is there; return the results, None before there are any."""
         from minari.dataset.minari_dataset import MinariDataset
 
         if not (folder / "d" / "arm" / "peace-v0").exists():
@@ -150,6 +167,7 @@ class Export:
     name = "export"
 
     def arguments(self, folder, rng):
+        """Return the words of the command."""
         ending = rng.choice(EXPORTS)
         if rng.random() < 0.5:
             (folder / f"a.{ending}").write_text("old")
@@ -157,6 +175,7 @@ class Export:
         return f"export straight {motion} --out a.{ending} --metres-per-unit 0.001 --json {FAST}".split()
 
     def facts(self, folder):
+        """Return what is there; None of the old file."""
         files = [path for path in folder.iterdir() if path.name.startswith("a.")]
         if not files or files[0].read_bytes() == b"old":
             return None
@@ -166,12 +185,12 @@ class Export:
 COMMANDS = {command.name: command for command in (Longest(), Bench(), Train(), Dataset(), Export())}
 
 
-def warm(base):
+def warm(base, with_training):
     """Load and compile what the commands need, and write the motion that is exported."""
-    from planners.rl import clone
+    if with_training:
+        from planners.rl import clone
 
-    clone.TESTS = 1  # the files are at stake, not the figures
-    clone.LEAST_STEPS = 300
+        clone.TESTS = 1  # the files are at stake, not the figures
     peace = base / "warm"
     peace.mkdir()
     before, words = os.getcwd(), sys.argv
@@ -180,25 +199,22 @@ def warm(base):
     kept = os.dup(1)
     try:
         os.dup2(sink, 1)
-        for command in (
-            f"plan straight --link-length 100 --out {base / 'motion.npz'} --json",
-            *(
-                " ".join(command.arguments(peace, random.Random(0)))
-                for command in (Longest(), Dataset(), Train())
-            ),
-            *(
-                f"export straight {base / 'motion.npz'} --out a.{e} --metres-per-unit 0.001 {FAST}"
-                for e in EXPORTS
-            ),
-        ):
-            sys.argv = ["hrsnake", *command.split()]
+        motion = base / "motion.npz"
+        whole = [
+            command.arguments(peace, random.Random(0))
+            for command in (Longest(), Dataset(), *([Train()] if with_training else []))
+        ]
+        exports = [f"export straight {motion} --out a.{e} --metres-per-unit 0.001 {FAST}" for e in EXPORTS]
+        plan = f"plan straight --link-length 100 --out {motion} --json"
+        for words_of in (plan.split(), *whole, *(export.split() for export in exports)):
+            sys.argv = ["hrsnake", *words_of]
             try:
                 from planners import cli
 
                 cli.main()
             except SystemExit as end:
                 if end.code:
-                    raise RuntimeError(f"{command} ended with {end.code}") from end
+                    raise RuntimeError(f"{sys.argv} ended with {end.code}") from end
             sys.stdout.flush()
     finally:
         os.dup2(kept, 1)
@@ -222,9 +238,6 @@ def in_peace(command, base, seed):
 
     def prepare():
         seen = 0
-
-        def act(_):
-            pass
 
         from benchmarks.trust import forks
 
@@ -326,7 +339,7 @@ def campaign(count, seed, names, bar):
     figures = {}
     with tempfile.TemporaryDirectory(prefix="hrsnake-kills-") as name:
         base = Path(name).resolve()
-        warm(base)
+        warm(base, with_training=Train.name in names)
         tasks = {each: bar.add_task(each, total=count) for each in names}
         for each in names:
             command, start = COMMANDS[each], time.monotonic()
