@@ -6,6 +6,7 @@ that is not clean. `--json` prints one JSON object instead of tables.
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -385,11 +386,13 @@ def main() -> None:
     try:
         with careful_interrupts():
             code = app(prog_name="hrsnake", standalone_mode=False)
+            sys.stdout.flush()
     except InputError as error:
         sys.exit(_complain(str(error)))
     except UsageError as error:
         sys.exit(_complain(error.format_message()))  # type: ignore[attr-defined]
     except OSError as error:
+        _drop_output()
         sys.exit(_complain(f"Expected files that can be read and written, got: {error}."))
     except MemoryError as error:
         sys.exit(_complain(f"Expected a motion that fits into memory, got: {error}. Longer links take less."))
@@ -398,6 +401,14 @@ def main() -> None:
     if code == INTERRUPTED:  # typer turns Ctrl-C into this code
         print("hrsnake: stopped; no half-written file is left.", file=sys.stderr)
     sys.exit(code or 0)
+
+
+def _drop_output() -> None:
+    """Forget what cannot be printed, as on a full disk: Python would try again at its end, and say so."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _complain(message: str) -> int:

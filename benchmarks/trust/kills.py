@@ -190,7 +190,7 @@ def warm(base, with_training):
     if with_training:
         from planners.rl import clone
 
-        clone.TESTS = 1  # the files are at stake, not the figures
+        clone.TESTS, clone.LEAST_STEPS = 1, 300  # the files are at stake, not the figures
     peace = base / "warm"
     peace.mkdir()
     before, words = os.getcwd(), sys.argv
