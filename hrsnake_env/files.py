@@ -40,15 +40,16 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     target = Path(os.path.realpath(path))
     if target.exists() and not target.is_file():
         raise InputError(f"Expected a file name to write, but '{path}' is no file.")
-    part, held = None, None
+    part, held, before = None, None, sys.exception()
     try:
         part, held = _held_part(target.parent, target.suffix, _new_file)
         yield part
         part.replace(target)
-    except OSError as error:
-        if error.errno is None or (error.filename and PART not in str(error.filename)):
+    except Exception as error:
+        first = _failed_write(error, before)
+        if first is None:
             raise
-        raise OSError(error.errno, error.strerror, str(path)) from error  # nobody has heard of the part
+        raise OSError(first.errno, first.strerror, str(path)) from error  # nobody has heard of the part
     finally:
         if part is not None:
             part.unlink(missing_ok=True)
@@ -145,6 +146,20 @@ def _held_part(folder: Path, suffix: str, make: Callable[[Path], int | None]) ->
             if _is_at(held, part):
                 return part, held
         _let_go(held)
+
+
+def _failed_write(error: BaseException | None, before: BaseException | None) -> OSError | None:
+    """Return the error of writing a part that has led to an error; None if there is none.
+
+    On a full disk some libraries fail again, in other ways, as they clean up. What was amiss `before` is no
+    concern of the part.
+    """
+    while error is not None and error is not before and not isinstance(error, InputError):
+        if isinstance(error, OSError):
+            ours = not error.filename or PART in str(error.filename)
+            return error if ours and error.errno is not None else None
+        error = error.__context__
+    return None
 
 
 def _new_file(path: Path) -> int:

@@ -77,6 +77,20 @@ def test_an_error_of_writing_names_the_file_that_was_wanted(tmp_path):
         pytest.fail("it went on")
 
 
+def test_a_full_disk_is_told_though_a_library_fails_otherwise_as_it_cleans_up(tmp_path):
+    target = tmp_path / "a.txt"
+    with pytest.raises(OSError, match=r"No space left on device: '.*a\.txt'$"), replacing(target):
+        try:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        finally:
+            raise AttributeError("pos")
+    try:
+        raise OSError(errno.EIO, "something before")
+    except OSError:
+        with pytest.raises(AttributeError, match="pos"), replacing(target):
+            raise AttributeError("pos") from None
+
+
 def killed(code, folder):
     """Run lines in a process that kills itself at their end."""
     lines = f"""
