@@ -7,6 +7,7 @@ the file is read-only, missing, of another kind, or its name is too long.
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
 import os
 import platform
@@ -57,6 +58,23 @@ FOLDERS = {
 """Commands that write a folder."""
 
 OLD = b"old"
+
+
+LOADED_LATER = (
+    "concurrent.futures.process",
+    "hrsnake_env.maps.picture",
+    "hrsnake_env.replay",
+    "minari",
+    "planners.bench.campaign",
+    "planners.bench.studies",
+    "planners.dataset",
+    "planners.demo",
+    "planners.drawing",
+    "planners.longest_chart",
+    "planners.rl.evaluate",
+    "planners.spatial.viewer",
+)
+"""Modules that commands load at need, and that somebody who owns nothing may not be able to read."""
 
 
 def limited():
@@ -159,6 +177,8 @@ def campaign(names, bar):
     with tempfile.TemporaryDirectory(prefix="hrsnake-disk-") as top:
         base = Path(top).resolve()
         base.chmod(0o755)
+        for module in LOADED_LATER:
+            importlib.import_module(module)
         (base / "here").mkdir()
         (base / "here").chmod(0o777)
         warm(base, with_training="train --out" in names)
