@@ -6,6 +6,7 @@ that is not clean. `--json` prints one JSON object instead of tables.
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -48,6 +49,7 @@ from planners.cli_tools import (
     progress_bars,
     radians,
 )
+from planners.interrupts import careful_interrupts
 from planners.length_trials import motion_path
 from planners.planning import TIME_BUDGET, plan
 from planners.problem import Motion, PlanningResult, Progress
@@ -386,12 +388,15 @@ app.add_typer(bench_app, name="bench", rich_help_panel=MORE)
 def main() -> None:
     """Run the command line: one sentence on stderr and exit code 2 for bad input, no traceback."""
     try:
-        code = app(prog_name="hrsnake", standalone_mode=False)
+        with careful_interrupts():
+            code = app(prog_name="hrsnake", standalone_mode=False)
+            sys.stdout.flush()
     except InputError as error:
         sys.exit(_complain(str(error)))
     except UsageError as error:
         sys.exit(_complain(error.format_message()))  # type: ignore[attr-defined]
     except OSError as error:
+        _drop_output()
         sys.exit(_complain(f"Expected files that can be read and written, got: {error}."))
     except MemoryError as error:
         sys.exit(_complain(f"Expected a motion that fits into memory, got: {error}. Longer links take less."))
@@ -400,6 +405,14 @@ def main() -> None:
     if code == INTERRUPTED:  # typer turns Ctrl-C into this code
         print("hrsnake: stopped; no half-written file is left.", file=sys.stderr)
     sys.exit(code or 0)
+
+
+def _drop_output() -> None:
+    """Forget what cannot be printed, as on a full disk: Python would try again at its end, and say so."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _complain(message: str) -> int:

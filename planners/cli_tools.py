@@ -160,8 +160,11 @@ def check_output(path: Path | None, endings: tuple[str, ...] = ()) -> None:
         raise InputError(f"Expected a file name ending in {', '.join(endings)}, got '{path}'.")
     if not path.parent.is_dir():
         raise InputError(f"Expected an existing folder for '{path}', but there is no '{path.parent}'.")
-    if path.is_dir():
-        raise InputError(f"Expected a file name to write, but '{path}' is a folder.")
+    if path.exists() and not path.is_file():
+        what = "a folder" if path.is_dir() else "no file"
+        raise InputError(f"Expected a file name to write, but '{path}' is {what}.")
+    if path.exists() and not os.access(path, os.W_OK):
+        raise InputError(f"Expected a file that may be written, but '{path}' may not.")
     if not os.access(path.parent, os.W_OK):
         raise InputError(f"Expected a folder that can be written, but '{path.parent}' cannot.")
 

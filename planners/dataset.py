@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ import gymnasium as gym
 import hrsnake_env
 from hrsnake_env.arguments import check_at_least, is_number
 from hrsnake_env.errors import InputError
+from hrsnake_env.files import scratch_folder
 from hrsnake_env.registration import ENVIRONMENTS
 from planners.dataset_writer import DatasetWriter, mean_return
 from planners.problem import Progress
@@ -182,8 +182,8 @@ def record_dataset(
         env.reset(options={"maze": name})
     # Hidden, so that Minari does not list it; beside the others, so that it can be renamed.
     root.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".recording-", dir=root) as part:
-        whole = Path(part) / "whole"
+    with scratch_folder(root) as part:
+        whole = part / "whole"
         whole.mkdir()
         writer = DatasetWriter(env, whole / "data", only_success)
         for number, (start, maze) in enumerate(starts):
@@ -193,6 +193,8 @@ def record_dataset(
         if writer.n_episodes:
             writer.finish(dataset_id, levels)
             folder.parent.mkdir(parents=True, exist_ok=True)
+            if folder.exists():
+                raise _taken(dataset_id, root)
             whole.rename(folder)
     env.close()
     return Recording(
@@ -236,8 +238,12 @@ def _new_folder(root: Path, dataset_id: str) -> Path:
         ) from None
     folder = root / dataset_id
     if folder.exists():
-        raise InputError(f"Expected the id of a new data set, but '{dataset_id}' is in '{root}' already.")
+        raise _taken(dataset_id, root)
     return folder
+
+
+def _taken(dataset_id: str, root: Path) -> InputError:
+    return InputError(f"Expected the id of a new data set, but '{dataset_id}' is in '{root}' already.")
 
 
 def _checked_levels(noises: Sequence[float]) -> tuple[float, ...]:

@@ -12,11 +12,13 @@ import math
 import os
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
+from hrsnake_env.files import locked
 from hrsnake_env.maze import Maze
 from planners.length_trials import LengthTrial, TrialFile, digest_of
 from planners.planning import PLANNERS, plan
@@ -192,7 +194,8 @@ def longest_link(
     Raises
     ------
     InputError
-        If an option is out of its range, the planner is unknown, or `state` is a file of something else.
+        If an option is out of its range, the planner is unknown, or `state` is a file of something else, or
+        in another process's hands.
 
     Examples
     --------
@@ -210,11 +213,18 @@ def longest_link(
         time_budget=time_budget,
     )
     question.check()
-    file = TrialFile.open(state, question.digest)
+    with nullcontext() if state is None else locked(state):
+        return _searched(question, TrialFile.open(state, question.digest), progress)
+
+
+def _searched(question: _Question, file: TrialFile, progress: Progress | None) -> LongestLink:
+    """Search on from what a file of trials knows."""
     if file.bound is None:
         deadline = time.perf_counter() + BOUND_BUDGET
-        finer = min(accuracy, ACCURACY)  # a coarse grid is no reason for a coarse index
-        file.bound = rod_bound(maze, link_radius, accuracy=finer, deadline=deadline, progress=progress)
+        finer = min(question.accuracy, ACCURACY)  # a coarse grid is no reason for a coarse index
+        file.bound = rod_bound(
+            question.maze, question.link_radius, accuracy=finer, deadline=deadline, progress=progress
+        )
         file.save()
     search = _Search(question, file, file.bound)
     try:

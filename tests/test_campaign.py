@@ -397,7 +397,7 @@ def test_a_worker_that_dies_or_hangs_costs_its_cell_alone(tmp_path, monkeypatch)
 
 def finished(out):
     """Count finished cells."""
-    return len([path for path in out.glob("cells/*.parquet") if ".part" not in path.name])
+    return len([path for path in out.glob("cells/*.parquet") if not path.name.startswith(".")])
 
 
 def ended(pid):
@@ -431,7 +431,7 @@ def test_a_run_that_is_killed_loses_and_doubles_nothing(tmp_path, monkeypatch):
             assert time.monotonic() < deadline
             time.sleep(0.02)
     assert 12 <= finished(broken) < N_CELLS
-    (broken / "cells" / "half.part.parquet").write_bytes(b"PAR1 and no more")
+    (broken / "cells" / ".hrsnake-0.part.parquet").write_bytes(b"PAR1 and no more")
     subprocess.run([sys.executable, str(WORKERS), str(broken)], env=environment(), check=True)
     kept = [sorted(path.name for path in folder.glob("cells/*")) for folder in (whole, broken)]
     assert kept[0] == kept[1]

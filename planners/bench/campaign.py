@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from hrsnake_env.errors import InputError
-from hrsnake_env.files import replacing
+from hrsnake_env.files import locked, replacing, tidy
 from planners.bench.cells import Cell, CellResult, Run
 from planners.bench.engines import check_engine, over_cells
 from planners.bench.methods import run_cell
@@ -97,10 +97,27 @@ def run_cells(
     Raises
     ------
     InputError
-        If the folder holds another study, or a package that the engine or the files need is missing.
+        If the folder holds another study, another process writes in it, or a package that the engine or the
+        files need is missing.
     """
     check_engine(engine, workers, address)
     check_pyarrow()
+    out.mkdir(parents=True, exist_ok=True)
+    with locked(out):
+        return _run_cells(cells, out, run, engine, workers, address, retry_errors, quiet)
+
+
+def _run_cells(
+    cells: Sequence[Cell],
+    out: Path,
+    run: Run,
+    engine: str,
+    workers: int | None,
+    address: str | None,
+    retry_errors: bool,
+    quiet: bool,
+) -> StudyRun:
+    """Do the cells in a folder that is this process's alone."""
     folder = _opened(cells[0].study, out)
     left = remaining(cells, out, retry_errors=retry_errors)
     if left:
@@ -160,9 +177,9 @@ def _opened(study: str, out: Path) -> Path:
         raise InputError(f"Expected the manifest of a study in '{out}', got something else.") from None
     if known != study:
         raise InputError(f"Expected a folder for the study '{study}', but '{out}' holds {shown(known)}.")
-    folder.mkdir(parents=True, exist_ok=True)
-    for path in (*out.glob("*.part.*"), *folder.glob("*.part.*")):
-        path.unlink(missing_ok=True)
+    folder.mkdir(exist_ok=True)
+    tidy(out)
+    tidy(folder)
     return folder
 
 
@@ -187,7 +204,7 @@ def _merged(cells: Sequence[Cell], folder: Path) -> list[Any]:
     """Return the rows of all finished cells, sorted; of the same work only one cell's."""
     wanted = {_path(cell, folder).name for cell in cells}
     best: dict[tuple[Any, ...], tuple[tuple[Any, ...], list[dict[str, Any]]]] = {}
-    for path in sorted(folder.glob("*.parquet")):
+    for path in sorted(folder.glob("[!.]*.parquet")):
         rows = read_rows(path)
         if rows:
             rank = (path.name in wanted, rows[0]["budget"], len(rows), path.name)

@@ -6,17 +6,17 @@ import importlib
 import math
 import multiprocessing
 import os
-import signal
 import socket
 import threading
 import time
-from collections.abc import Generator, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Generator, Sequence
+from contextlib import suppress
 from multiprocessing.connection import wait
 from typing import Any
 
 from hrsnake_env.errors import InputError
 from planners.bench.cells import Cell, CellResult, Run, error_rows
+from planners.bench.pool import end_with_parent, no_ctrl_c
 
 __all__ = ["DIED", "ENGINES", "over_cells"]
 
@@ -118,30 +118,10 @@ class _Worker:
 
 
 def _serve(run: Run, pipe: Any) -> None:
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=end_with_parent, daemon=True).start()
     with suppress(EOFError, ConnectionError):  # the parent has ended
         while True:
             pipe.send(run(pipe.recv()))
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)  # in the midst of a cell, too: nobody would take its result
-
-
-@contextmanager
-def _no_ctrl_c() -> Iterator[None]:
-    """Ignore Ctrl-C in the block, and ever after in processes that are started in it."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _over_processes(cells: Sequence[Cell], run: Run, count: int) -> Done:
@@ -170,7 +150,7 @@ def _over_processes(cells: Sequence[Cell], run: Run, count: int) -> Done:
 
 
 def _start(workers: list[_Worker], run: Run) -> None:
-    with _no_ctrl_c():
+    with no_ctrl_c():
         workers.append(_Worker(run))
 
 

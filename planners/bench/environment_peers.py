@@ -16,6 +16,7 @@ from typing import IO, Any
 import numpy as np
 
 from hrsnake_env.errors import InputError
+from hrsnake_env.files import replacing
 from planners.bench.environment_scenes import ENV_ID, arm_in_hall, half_out, hall
 from planners.bench.environment_stepper import HOLD
 from planners.bench.pool import Tell
@@ -79,7 +80,8 @@ def peers_python(folder: Path) -> Path:
             f"Expected pip to install {' and '.join(REQUIREMENTS)} in '{folder}' (it needs a network; "
             f"--peers-python names a Python that has them), got: {_last_line(error)}"
         ) from None
-    ready.write_text(json.dumps(REQUIREMENTS), encoding="utf-8")
+    with replacing(ready) as part:
+        part.write_text(json.dumps(REQUIREMENTS), encoding="utf-8")
     return python
 
 

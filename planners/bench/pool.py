@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -17,9 +18,10 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from hrsnake_env.errors import InputError
+from hrsnake_env.files import locked
 from planners.reading import NotReadable, read_limited
 
-__all__ = ["Tell", "bar", "over_processes", "resumed", "worker_pool"]
+__all__ = ["Tell", "bar", "end_with_parent", "no_ctrl_c", "over_processes", "resumed", "worker_pool"]
 
 LINES_BYTES = 256 * 2**20
 """Of a file of lines, each of which is small."""
@@ -66,7 +68,29 @@ def worker_pool(workers: int, warm_up: Callable[[], None]) -> Iterator[ProcessPo
 
 def _start(warm_up: Callable[[], None]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's business
+    threading.Thread(target=end_with_parent, daemon=True).start()
     warm_up()
+
+
+def end_with_parent() -> None:
+    """End this process when its parent has ended, in the midst of its work, too: nobody would take it."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
+
+
+@contextmanager
+def no_ctrl_c() -> Iterator[None]:
+    """Ignore Ctrl-C in the block, and ever after in processes that are started in it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def over_processes(
@@ -88,7 +112,9 @@ def over_processes(
     tell : callable
         Called after each.
     """
-    for future in as_completed([pool.submit(function, *task) for task in tasks]):
+    with no_ctrl_c():  # processes start with the first task
+        futures = [pool.submit(function, *task) for task in tasks]
+    for future in as_completed(futures):
         tell()
         yield future.result()
 
@@ -121,11 +147,24 @@ def resumed(
     Raises
     ------
     InputError
-        If the file holds something else.
+        If the file holds something else, or another process adds lines to it.
     """
-    done = _read(path)
-    wanted = [task for task in tasks if json.dumps(task) not in done]
     path.parent.mkdir(parents=True, exist_ok=True)
+    with locked(path):
+        done = _read(path)
+        _do(path, function, [task for task in tasks if json.dumps(task) not in done], warm_up, workers, done)
+    return [done[json.dumps(task)] for task in tasks if json.dumps(task) in done]
+
+
+def _do(
+    path: Path,
+    function: Callable[..., dict[str, Any]],
+    wanted: Sequence[tuple[Any, ...]],
+    warm_up: Callable[[], None],
+    workers: int | None,
+    done: dict[str, dict[str, Any]],
+) -> None:
+    """Do tasks, and add them to what is done, and to the file."""
     count = os.cpu_count() or 1 if workers is None else workers
     with bar(path.stem, len(wanted)) as tell, worker_pool(count, warm_up) as pool, path.open("a") as file:
         try:
@@ -135,7 +174,6 @@ def resumed(
                 done[json.dumps(row["task"])] = row
         except KeyboardInterrupt:
             print(f"Stopped; run it again to go on from '{path.name}'.", file=sys.stderr)
-    return [done[json.dumps(task)] for task in tasks if json.dumps(task) in done]
 
 
 def _read(path: Path) -> dict[str, dict[str, Any]]:
@@ -143,8 +181,8 @@ def _read(path: Path) -> dict[str, dict[str, Any]]:
     if not path.exists():
         return {}
     try:
-        text = read_limited(path, LINES_BYTES).decode("utf-8")
-        whole = text[: text.rfind("\n") + 1]
+        text = read_limited(path, LINES_BYTES)
+        whole = text[: text.rfind(b"\n") + 1]
         rows = [json.loads(line) for line in whole.splitlines()]
         done = {json.dumps(row["task"]): row for row in rows}
     except (NotReadable, ValueError, KeyError, TypeError, RecursionError):
@@ -152,5 +190,5 @@ def _read(path: Path) -> dict[str, dict[str, Any]]:
             f"Expected lines of JSON, each with its task, in '{path}', got something else."
         ) from None
     if whole != text:
-        path.write_text(whole, encoding="utf-8")
+        os.truncate(path, len(whole))  # at one stroke: rows that are there stay, whatever happens
     return done

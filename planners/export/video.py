@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from contextlib import AbstractContextManager, nullcontext
+import errno
+import subprocess
+from collections.abc import Collection, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -60,7 +62,7 @@ def _film(
     writer, settings = _writer(kind, rate)
     picture = MazePicture(maze, height=HEIGHT, title="orange: pinches a wall")
     reach = link_radius + PINCH_TOLERANCE * trajectory.link_length
-    with TemporaryDirectory() as folder, settings:
+    with TemporaryDirectory() as folder, settings, _ffmpeg_errors(folder):
         out = Path(folder) / f"arm.{kind}"
         with writer.saving(picture.figure, str(out), dpi=picture.figure.dpi):
             for number, joints in enumerate(frames):
@@ -69,6 +71,15 @@ def _film(
                 if progress is not None:
                     progress("film", (number + 1) / len(frames))
         return out.read_bytes()
+
+
+@contextmanager
+def _ffmpeg_errors(folder: str) -> Iterator[None]:
+    """Tell that ffmpeg has failed, as on a full disk, as an error of writing."""
+    try:
+        yield
+    except (BrokenPipeError, subprocess.CalledProcessError) as error:
+        raise OSError(errno.EIO, "ffmpeg could not write the film (is the disk full?)", folder) from error
 
 
 def _frames(kind: str, trajectory: Trajectory) -> tuple[FloatArray, float]:

@@ -33,7 +33,7 @@ from planners.rl.environments import make_env
 from planners.rl.evaluate import evaluate
 from planners.rl.fitting import Layers, fitted, load_torch
 from planners.rl.network import NetworkPolicy, observation_layout
-from planners.rl.runs import CHECKPOINT, TrainingRun, old_progress, origin_of, write_run
+from planners.rl.runs import CHECKPOINT, TrainingRun, old_progress, origin_of, run_folder, write_run
 from planners.rl.settings import CLONING, Settings, load_settings
 from planners.rl.watch import Progress, Stop, Tell, stop_on_interrupt, training_bar
 
@@ -180,7 +180,11 @@ def clone(
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # small networks are slower with more
     try:
-        with stop_on_interrupt() as stop, training_bar(method, total, quiet) as tell:
+        with (
+            run_folder(Path(folder)),
+            stop_on_interrupt() as stop,
+            training_bar(method, total, quiet) as tell,
+        ):
             school = _School(settings, seed, env, stop, tell)
             return school.run(total, Path(folder), resume, stop_at)
     finally:
@@ -202,7 +206,6 @@ class _School:
         task.pop("n_timesteps")  # a resumed run may be longer
         checkpoint = folder / CHECKPOINT
         old = old_progress(checkpoint, task, resume)
-        folder.mkdir(parents=True, exist_ok=True)
         progress = old or Progress()
         lessons = self._first(total) if old is None else self._resumed(checkpoint)
         cpu, wall = progress.cpu_seconds - time.process_time(), progress.seconds - time.monotonic()

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from hrsnake_env.errors import InputError
-from hrsnake_env.files import replacing
+from hrsnake_env.files import locked, replacing
 from planners.rl.checkpoints import read_progress
 from planners.rl.network import NetworkPolicy, Origin
 from planners.rl.settings import Settings
 from planners.rl.watch import Progress
 
-__all__ = ["CHECKPOINT", "TrainingRun", "old_progress", "origin_of", "write_run"]
+__all__ = ["CHECKPOINT", "TrainingRun", "old_progress", "origin_of", "run_folder", "write_run"]
 
 STOPPED = {
     "learnt": "the task is learnt",
@@ -81,6 +82,14 @@ class TrainingRun:
         yield "stopped", STOPPED[self.stopped]
         yield "policy", str(self.policy)
         yield "checkpoint", str(self.checkpoint)
+
+
+@contextmanager
+def run_folder(folder: Path) -> Iterator[None]:
+    """Make a run's folder if it is missing, and keep it for this process alone."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with locked(folder):
+        yield
 
 
 def old_progress(checkpoint: Path, task: dict[str, Any], resume: bool) -> Progress | None:

@@ -16,7 +16,7 @@ from planners.rl.checkpoints import write_checkpoint
 from planners.rl.clone import clone
 from planners.rl.models import learners, new_model, resumed_model, vector
 from planners.rl.network import NetworkPolicy
-from planners.rl.runs import CHECKPOINT, TrainingRun, old_progress, origin_of, write_run
+from planners.rl.runs import CHECKPOINT, TrainingRun, old_progress, origin_of, run_folder, write_run
 from planners.rl.settings import CLONING, METHODS, Settings, load_settings
 from planners.rl.watch import Progress, Watch, stop_on_interrupt, training_bar
 
@@ -105,7 +105,7 @@ def train(
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # small networks are slower with more
     try:
-        with closing(vector(chosen)) as envs:
+        with closing(vector(chosen)) as envs, run_folder(Path(folder)):
             return _run(chosen, envs, seed, total, Path(folder), resume, stop_at, quiet)
     finally:
         torch.set_num_threads(threads)
@@ -126,7 +126,6 @@ def _run(
     task = json.loads(json.dumps({**asdict(settings), "seed": seed}))
     task.pop("n_timesteps")  # a resumed run may be longer
     old = old_progress(checkpoint, task, resume)
-    folder.mkdir(parents=True, exist_ok=True)
     if old is None:
         progress, model = Progress(), new_model(settings, envs, seed, folder)
     else:

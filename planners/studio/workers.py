@@ -20,6 +20,7 @@ from types import FrameType
 from typing import Any
 
 from hrsnake_env.errors import InputError
+from planners.interrupts import again, in_foreign_code
 from planners.studio.limits import Limits
 from planners.studio.requests import read_request
 
@@ -35,9 +36,6 @@ STOP = b"stop"
 """What a worker is sent to end a search with what it has."""
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-
-AGAIN_S = 0.01
-"""Seconds after which a search is interrupted again that could not be at that moment."""
 
 QUIET_S = 0.05
 """Seconds from one line of progress to the next, at least."""
@@ -189,8 +187,8 @@ class Desk:
         """End a search early if that was asked for. Ctrl-C in the terminal concerns the server alone."""
         if not (self.stopped and self.stoppable):
             return
-        if _in_foreign_code(frame):
-            threading.Timer(AGAIN_S, _thread.interrupt_main).start()
+        if in_foreign_code(frame):
+            again()
             return
         self.stoppable = False
         raise KeyboardInterrupt
@@ -215,15 +213,6 @@ class Desk:
         if now - self.told >= QUIET_S:
             self.told = now
             self.say(type="progress", **fields)
-
-
-def _in_foreign_code(frame: FrameType | None) -> bool:
-    """Tell whether pymunk is at work: what frees its objects is not run again once interrupted."""
-    while frame is not None:
-        if frame.f_globals.get("__name__", "").partition(".")[0] in ("pymunk", "cffi"):
-            return True
-        frame = frame.f_back
-    return False
 
 
 def _work(connection: Connection, worker_bytes: int) -> None:
