@@ -19,7 +19,7 @@ def check_lengths(scene: Scene) -> tuple[float, Fault | None]:
     """Check that every link has its exact length; return the largest deviation too."""
     lengths = np.linalg.norm(np.diff(scene.motion.joints, axis=1), axis=2)
     amount, pose, link = worst_of(np.abs(lengths - scene.length))
-    if amount <= ROUNDING * scene.length:
+    if amount <= scene.length_slack:
         return amount, None
     figure = f"{lengths[pose, link]:.9g} {scene.maze.units}"
     message = f"Link {link} is {figure} long at pose {pose}, not {scene.length:g}."

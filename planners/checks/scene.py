@@ -54,6 +54,12 @@ class Scene:
         )
 
     @cached_property
+    def length_slack(self) -> float:
+        """How far an exact link may be off its length as coordinates are rounded, in maze units."""
+        largest = float(np.abs(self.motion.joints).max())
+        return ROUNDING * self.length + 4.0 * float(np.finfo(np.float64).eps) * largest
+
+    @cached_property
     def free(self) -> Geometry:
         """The free space."""
         return prepared(self.maze.free_space)

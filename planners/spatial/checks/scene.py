@@ -102,6 +102,12 @@ class Scene:
         return ROUNDING * self.length + 100.0 * float(np.finfo(np.float64).eps * size)
 
     @cached_property
+    def length_slack(self) -> float:
+        """How far an exact link may be off its length as coordinates are rounded, in workspace units."""
+        largest = float(np.abs(self.motion.joints).max())
+        return ROUNDING * self.length + 4.0 * float(np.finfo(np.float64).eps) * largest
+
+    @cached_property
     def arc(self) -> FloatArray:
         """How far past the base each joint is along the arm, shape (n_poses, n_links + 1)."""
         return self.arc_from_feed(self.motion.feed)
