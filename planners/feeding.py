@@ -77,7 +77,7 @@ def feed(
         Segments, in maze units, in the plane alone; if given, feeding ends at the first pose that meets one
         of them or itself. That is before the first pose if chords that end at points of the track do.
     """
-    # Seen from the base: far from the origin, rounding is as large as the steps in which joints are told apart.
+    # Seen from the base: far from the origin, rounding would be larger than what tells joints apart.
     origin: FloatArray = track[0].copy()
     base_pose = np.concatenate([base_pose[: len(origin)] - origin, base_pose[len(origin) :]])
     track, arc = _subdivided(track - origin, link_length)
