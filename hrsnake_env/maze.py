@@ -328,8 +328,13 @@ def _checked_parts(free_space: Any) -> list[Polygon]:
 
 
 def _without_collinear_vertices(polygon: Polygon) -> Polygon:
-    simple = polygon.simplify(0.0)
-    return simple if simple.is_valid and simple.symmetric_difference(polygon).area == 0.0 else polygon
+    """Return the same polygon with fewer vertices, so that a maze from its own polygon is the same maze."""
+    while True:
+        simple = polygon.simplify(0.0)
+        fewer = shapely.get_num_coordinates(simple) < shapely.get_num_coordinates(polygon)
+        if not (fewer and simple.is_valid and simple.symmetric_difference(polygon).area == 0.0):
+            return polygon
+        polygon = simple
 
 
 def _front_clearance(ray: LineString, walls: Any) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import zipfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from types import MappingProxyType
 from typing import IO, Any, Generic, Protocol, TypeVar
@@ -171,6 +171,12 @@ class Motion:
                 f"Expected a motion from the base of maze '{maze.name}' at {others}, got one from {mine}: "
                 f"it belongs to another maze."
             )
+
+    def moved(self, way: ArrayLike) -> Motion:
+        """Return the same motion with everything moved by a vector, shape (2,)."""
+        way = np.asarray(way, dtype=np.float64)
+        base_pose = np.concatenate([self.base_pose[:2] + way, self.base_pose[2:]])
+        return replace(self, joints=self.joints + way, base_pose=base_pose)
 
     def with_links(self, n_links: int) -> Motion:
         """Return the same motion of an arm with more links, which stay in the feeder.
