@@ -96,7 +96,7 @@ class Maze:
                 f"Expected a goal away from the base, got one whose radius of {self.goal_radius:g} reaches "
                 f"the tip in the feeder: there is nothing to plan."
             )
-        object.__setattr__(self, "free_space", orient(_without_collinear_vertices(part)))
+        object.__setattr__(self, "free_space", _without_collinear_vertices(orient(part)))
         object.__setattr__(self, "base_pose", base_pose)
         object.__setattr__(self, "goal", goal)
         object.__setattr__(self, "goal_radius", float(self.goal_radius))

@@ -103,7 +103,7 @@ class Scene:
 
     @cached_property
     def far(self) -> float:
-        """What rounding of coordinates makes of a length, in workspace units: some units in their last place."""
+        """What rounding of coordinates makes of a length: some units in their last place."""
         return 4.0 * float(np.finfo(np.float64).eps * np.abs(self.motion.joints).max())
 
     @property
