@@ -97,12 +97,16 @@ def _disc_passes(maze: Maze, radius: float) -> bool:
 
 
 def _shrunk(free_space: Any, radius: float) -> Any:
-    """Return where the centre of a disc may be; of walls in many pieces, to some thousandths of the radius.
+    """Return where the centre of a disc may be; of walls in many pieces, to about a hundredth of the radius.
 
     Pieces much shorter than the radius are slow to shrink at once, as the arcs round them all meet.
     """
     if shapely.get_num_coordinates(free_space) <= MANY_CORNERS:
         return free_space.buffer(-radius, quad_segs=4)
+    for tolerance in (0.001, 0.005, 0.02):
+        free_space = free_space.simplify(tolerance * radius)
+        if shapely.get_num_coordinates(free_space) <= MANY_CORNERS:
+            break
     done = 0.0
     for share in (0.03, 0.15, 1.0):
         free_space = free_space.buffer(done - share * radius, quad_segs=4).simplify(0.001 * radius)
