@@ -48,6 +48,9 @@ PLANNERS: dict[str, Callable[[Query], Candidate]] = {
 ROD = 1e-3
 """How finely, in link lengths, it is decided whether a rod passes."""
 
+SHORTEST = 1e-4
+"""Shortest links that are planned for, in sizes of the maze: an arm of more has no place in memory."""
+
 TIME_BUDGET = 60.0
 """Seconds that planning may take by default."""
 
@@ -110,6 +113,11 @@ def plan(
     if not (isinstance(seed, int | np.integer) and seed >= 0):
         raise InputError(f"Expected a whole seed of at least 0, got {seed!r}.")
     maze.check_arm(arm)
+    if arm.link_length < SHORTEST * maze.size:
+        raise InputError(
+            f"Expected links of at least {SHORTEST * maze.size:g} {maze.units}, a ten-thousandth of the size "
+            f"of maze '{maze.name}', got {arm.link_length:g}."
+        )
     if warm_start is not None:
         _check_warm_start(warm_start, maze, arm)
     deadline = time.perf_counter() + time_budget
