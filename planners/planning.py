@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from hrsnake_env.arguments import is_number
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
@@ -108,7 +109,7 @@ def plan(
     """
     if planner != "auto" and planner not in PLANNERS:
         raise InputError(f"Unknown planner {planner!r}. Available: auto, {', '.join(PLANNERS)}.")
-    if not time_budget > 0.0:
+    if not is_number(time_budget) or not time_budget > 0.0:
         raise InputError(f"Expected a positive time_budget in seconds, got {time_budget!r}.")
     if not (isinstance(seed, int | np.integer) and seed >= 0):
         raise InputError(f"Expected a whole seed of at least 0, got {seed!r}.")

@@ -15,6 +15,7 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners.planning import plan
 from planners.potential import passage_width
+from planners.rod_bound import rod_bound
 from planners.spatial import Workspace, random_room
 from planners.spatial import plan as plan_in_space
 from planners.validation import validate
@@ -130,6 +131,9 @@ def test_small_pieces_of_walls_hardly_change_the_width_of_the_passage():
         lambda: corridor(goal=(3.0, 0.0)),
         lambda: corridor(base_pose=(-0.05, 0.0, 0.0)),
         lambda: plan(corridor(), ArmSpec(link_length=1e-6)),
+        lambda: plan(corridor(), ArmSpec(link_length=1.0), time_budget="long"),
+        lambda: rod_bound(corridor(), float("nan")),
+        lambda: rod_bound(corridor(), -1.0),
     ],
 )
 def test_what_is_no_maze_or_arm_is_refused_in_one_sentence(make):
