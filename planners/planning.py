@@ -49,7 +49,7 @@ PLANNERS: dict[str, Callable[[Query], Candidate]] = {
 ROD = 1e-3
 """How finely, in link lengths, it is decided whether a rod passes."""
 
-SHORTEST = 1e-4
+SHORTEST = 1e-3
 """Shortest links that are planned for, in sizes of the maze: an arm of more has no place in memory."""
 
 TIME_BUDGET = 60.0
@@ -116,7 +116,7 @@ def plan(
     maze.check_arm(arm)
     if arm.link_length < SHORTEST * maze.size:
         raise InputError(
-            f"Expected links of at least {SHORTEST * maze.size:g} {maze.units}, a ten-thousandth of the size "
+            f"Expected links of at least {SHORTEST * maze.size:g} {maze.units}, a thousandth of the size "
             f"of maze '{maze.name}', got {arm.link_length:g}."
         )
     if warm_start is not None:
