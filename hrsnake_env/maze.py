@@ -17,6 +17,7 @@ from shapely.geometry import LineString, MultiPolygon, Point, Polygon, mapping, 
 from shapely.geometry.polygon import orient
 from shapely.validation import explain_validity
 
+from hrsnake_env.arguments import is_number
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
@@ -75,7 +76,7 @@ class Maze:
     def __post_init__(self) -> None:
         base_pose = _frozen_array(self.base_pose, (3,), "base_pose (x, y, heading)")
         goal = _frozen_array(self.goal, (2,), "goal (x, y)")
-        if not (math.isfinite(self.goal_radius) and self.goal_radius > 0.0):
+        if not is_number(self.goal_radius) or not 0.0 < self.goal_radius < math.inf:
             raise InputError(f"Expected a positive, finite goal radius, got {self.goal_radius!r}.")
         parts = _checked_parts(self.free_space)
         base, tip = Point(base_pose[:2]), Point(goal)
@@ -96,7 +97,7 @@ class Maze:
                 f"Expected a goal away from the base, got one whose radius of {self.goal_radius:g} reaches "
                 f"the tip in the feeder: there is nothing to plan."
             )
-        object.__setattr__(self, "free_space", orient(_without_collinear_vertices(part)))
+        object.__setattr__(self, "free_space", _without_collinear_vertices(orient(part)))
         object.__setattr__(self, "base_pose", base_pose)
         object.__setattr__(self, "goal", goal)
         object.__setattr__(self, "goal_radius", float(self.goal_radius))
@@ -279,9 +280,9 @@ class Maze:
         360000.0
         """
         lines = _as_centrelines(centrelines)
-        widths = [float(value) for value in np.broadcast_to(np.asarray(width, dtype=np.float64), len(lines))]
-        if not all(math.isfinite(value) and value > 0.0 for value in widths):
-            raise InputError(f"Expected a positive, finite corridor width, got {width!r}.")
+        widths = _as_widths(width, len(lines))
+        if not is_number(base_offset) or not math.isfinite(base_offset):
+            raise InputError(f"Expected a finite base_offset, got {base_offset!r}.")
         start, along = lines[0][0], _unit(lines[0][1] - lines[0][0])
         end, back = lines[-1][-1], _unit(lines[-1][-2] - lines[-1][-1])
         base = start + base_offset * along
@@ -328,8 +329,13 @@ def _checked_parts(free_space: Any) -> list[Polygon]:
 
 
 def _without_collinear_vertices(polygon: Polygon) -> Polygon:
-    simple = polygon.simplify(0.0)
-    return simple if simple.is_valid and simple.symmetric_difference(polygon).area == 0.0 else polygon
+    """Return the same polygon with fewer vertices, so that a maze from its own polygon is the same maze."""
+    while True:
+        simple = polygon.simplify(0.0)
+        fewer = shapely.get_num_coordinates(simple) < shapely.get_num_coordinates(polygon)
+        if not (fewer and simple.is_valid and simple.symmetric_difference(polygon).area == 0.0):
+            return polygon
+        polygon = simple
 
 
 def _front_clearance(ray: LineString, walls: Any) -> float:
@@ -418,10 +424,24 @@ def _as_centrelines(centrelines: ArrayLike | Sequence[ArrayLike]) -> list[FloatA
         lines = [single] if single.ndim == 2 else list(single)
     except ValueError:  # corridors with different numbers of waypoints
         lines = [np.asarray(line, dtype=np.float64) for line in centrelines]  # type: ignore[union-attr]
+    if not lines:
+        raise InputError("Expected at least one centreline, got none.")
     for line in lines:
         if line.ndim != 2 or line.shape[1] != 2 or len(line) < 2 or not np.isfinite(line).all():
             raise InputError(f"Expected each centreline with shape (n >= 2, 2), got {line.shape}.")
     return lines
+
+
+def _as_widths(width: Any, n: int) -> list[float]:
+    try:
+        widths = np.broadcast_to(np.asarray(width, dtype=np.float64), n).tolist()
+    except (TypeError, ValueError):
+        raise InputError(
+            f"Expected a corridor width, or one for each of {n} centrelines, got {width!r}."
+        ) from None
+    if not all(math.isfinite(value) and value > 0.0 for value in widths):
+        raise InputError(f"Expected a positive, finite corridor width, got {width!r}.")
+    return [float(value) for value in widths]
 
 
 def _unit(vector: FloatArray) -> FloatArray:

@@ -33,6 +33,7 @@ from hrsnake_env.arm import FEEDER_RELEASE, ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners.beams import Beams
+from planners.checking import Late
 from planners.kernels import beam_arm as kernel
 from planners.kernels.beam_arm import (
     choose,
@@ -92,6 +93,9 @@ STEP = 0.03
 
 LONGEST_BEAM = 1.2
 """Beams are cut to this many passage widths for aiming: at a junction they reach down other corridors."""
+
+AT_A_TIME = 50
+"""Poses that are fed between two looks at the clock; among thousands of walls they take long."""
 
 HAIR = 1e-9
 """Beams end this share of their length before the wall, so that rounding puts no link's end into it."""
@@ -182,7 +186,7 @@ def plan_beam(query: Query, rules: Rules = CLAMPED) -> Candidate:
         return query.no_path()
     query.tell("plan", 0.2)
     clock = [time.perf_counter()]
-    run = run_beam(geometry, query.arm, rules, record=False)
+    run = run_beam(geometry, query.arm, rules, record=False, deadline=query.deadline)
     clock.append(time.perf_counter())
     query.tell("plan", 1.0)
     if run.ending != kernel.GOAL:
@@ -319,7 +323,14 @@ class FedArm:
         return int(self._progress[0])
 
 
-def run_beam(geometry: Geometry, arm: ArmSpec, rules: Rules = CLAMPED, *, record: bool = True) -> BeamRun:
+def run_beam(
+    geometry: Geometry,
+    arm: ArmSpec,
+    rules: Rules = CLAMPED,
+    *,
+    record: bool = True,
+    deadline: float = math.inf,
+) -> BeamRun:
     """Feed an arm by the rules from the feeder to the goal, or as far as it goes.
 
     Parameters
@@ -332,9 +343,20 @@ def run_beam(geometry: Geometry, arm: ArmSpec, rules: Rules = CLAMPED, *, record
         Which rules are followed.
     record : bool
         Whether what each link does is recorded.
+    deadline : float
+        On the clock of `time.perf_counter`.
+
+    Raises
+    ------
+    Late
+        If time is over before the arm has come to its end.
     """
     fed = FedArm(geometry, arm, rules, record=record)
-    ending, link = fed.feed()
+    ending, link = fed.feed(AT_A_TIME)
+    while ending == kernel.FULL:
+        if time.perf_counter() > deadline:
+            raise Late
+        ending, link = fed.feed(AT_A_TIME)
     n = fed.n_poses
     at = fed.links[0 if ending in (kernel.GOAL, kernel.TOO_LONG) else link + 1]
     return BeamRun(

@@ -77,13 +77,16 @@ def feed(
         Segments, in maze units, in the plane alone; if given, feeding ends at the first pose that meets one
         of them or itself. That is before the first pose if chords that end at points of the track do.
     """
-    track, arc = _subdivided(track, link_length)
+    # Seen from the base: far from the origin, rounding would be larger than what tells joints apart.
+    origin: FloatArray = track[0].copy()
+    base_pose = np.concatenate([base_pose[: len(origin)] - origin, base_pose[len(origin) :]])
+    track, arc = _subdivided(track - origin, link_length)
     sweep = UNCHECKED
     if walls is not None:
-        free, found = sweep_chords(track, arc, link_length, walls)
+        free, found = sweep_chords(track, arc, link_length, walls - origin)
         sweep = Sweep(*found)
         if not free:
-            return Feeding(poses=np.empty((0, 0, 2)), ending=kernel.MEETS, place=tuple(track[0].tolist()))
+            return Feeding(poses=np.empty((0, 0, 2)), ending=kernel.MEETS, place=tuple(origin.tolist()))
     n_links = kernel.links_at_end(track, arc, link_length)
     if n_links < 0:
         n_links = math.floor(arc[-1] / link_length) + 2
@@ -102,7 +105,8 @@ def feed(
     aside = np.linalg.norm(offset - along[:, None] * heading, axis=1)
     inside = (along <= 1e-9 * link_length) & (aside <= 1e-9 * link_length)
     unused = int(np.argmin(inside[1:]))
-    return Feeding(poses=poses[:, unused:], ending=ending, place=tuple(poses[-1, -1].tolist()))
+    poses = poses[:, unused:] + origin
+    return Feeding(poses=poses, ending=ending, place=tuple(poses[-1, -1].tolist()))
 
 
 def _subdivided(track: FloatArray, link_length: float) -> tuple[FloatArray, FloatArray]:

@@ -8,6 +8,7 @@ import math
 import numpy as np
 from shapely.geometry import LineString, Point, Polygon
 
+from hrsnake_env.arguments import check_at_least
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners.kernels.types import FloatArray
@@ -35,7 +36,13 @@ def inset_maze(maze: Maze, radius: float) -> Maze | None:
     -------
     inset : Maze or None
         None if the goal cannot be reached by a disc of this radius.
+
+    Raises
+    ------
+    InputError
+        If the radius is no finite number of at least 0.
     """
+    check_at_least("link_radius", radius, 0.0)
     if radius == 0.0:
         return maze
     grown = radius / math.cos(math.pi / (4 * QUAD_SEGS))

@@ -9,9 +9,11 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from hrsnake_env.arm import ArmSpec
+from hrsnake_env.arguments import is_number
+from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
+from planners.afar import moved_report, moved_result, seen_from_base
 from planners.baselines import BASELINES
 from planners.beam_planner import plan_as_printed, plan_beam
 from planners.checking import Checker, Late
@@ -25,6 +27,7 @@ from planners.problem import (
     PlanningResult,
     PlanningStatus,
     Progress,
+    ValidationReport,
 )
 from planners.query import Query
 from planners.rod_bound import Passage, rod_passes
@@ -45,6 +48,9 @@ PLANNERS: dict[str, Callable[[Query], Candidate]] = {
 
 ROD = 1e-3
 """How finely, in link lengths, it is decided whether a rod passes."""
+
+SHORTEST = 1e-3
+"""Shortest links that are planned for, in sizes of the maze: an arm of more has no place in memory."""
 
 TIME_BUDGET = 60.0
 """Seconds that planning may take by default."""
@@ -103,18 +109,28 @@ def plan(
     """
     if planner != "auto" and planner not in PLANNERS:
         raise InputError(f"Unknown planner {planner!r}. Available: auto, {', '.join(PLANNERS)}.")
-    if not time_budget > 0.0:
+    if not is_number(time_budget) or not time_budget > 0.0:
         raise InputError(f"Expected a positive time_budget in seconds, got {time_budget!r}.")
     if not (isinstance(seed, int | np.integer) and seed >= 0):
         raise InputError(f"Expected a whole seed of at least 0, got {seed!r}.")
     maze.check_arm(arm)
+    if arm.link_length < SHORTEST * maze.size:
+        raise InputError(
+            f"Expected links of at least {SHORTEST * maze.size:g} {maze.units}, a thousandth of the size "
+            f"of maze '{maze.name}', got {arm.link_length:g}."
+        )
     if warm_start is not None:
         _check_warm_start(warm_start, maze, arm)
     deadline = time.perf_counter() + time_budget
     bare = dataclasses.replace(arm, n_links=None)  # planners give as many links as the motion needs
-    checker = Checker[Motion](lambda motion, tell: validate(motion, maze, bare, tell), deadline, progress)
+    seen, origin = seen_from_base(maze, arm.link_length)
+    if warm_start is not None and origin is not None:
+        warm_start = warm_start.moved(-origin)
+    checker = Checker[Motion](
+        lambda motion, tell: _checked(motion, maze, bare, tell, origin), deadline, progress
+    )
     query = Query(
-        maze=maze,
+        maze=seen,
         arm=arm,
         deadline=deadline,
         seed=int(seed),
@@ -122,6 +138,24 @@ def plan(
         refused=checker.refused,
         progress=progress,
     )
+    result = _asked(query, planner, checker, warm_start, explain=explain)
+    return result if origin is None else moved_result(result, origin)
+
+
+def _checked(
+    motion: Motion, maze: Maze, arm: ArmSpec, tell: Progress, origin: FloatArray | None
+) -> ValidationReport:
+    """Check a motion in the maze as it is, wherever planners see it from."""
+    if origin is None:
+        return validate(motion, maze, arm, tell)
+    return moved_report(validate(motion.moved(origin), maze, arm, tell), -origin)
+
+
+def _asked(
+    query: Query, planner: str, checker: Checker[Motion], warm_start: Motion | None, *, explain: bool
+) -> PlanningResult:
+    """Ask one planner or, as `auto`, one after the other."""
+    maze, arm = query.maze, query.arm
     hearing, proof = _Hearing(checker), ""
     if planner != "auto":
         own = Question(planner, 0, dataclasses.replace(query, warm_start=warm_start))
@@ -129,7 +163,7 @@ def plan(
     else:
         result = hearing.first_solved(first_questions(query, warm_start))
         if result is None and hearing.shortage is None and not query.late and query.geometry is not None:
-            rod = rod_passes(maze, arm.link_length, arm.link_radius, resolution=ROD, deadline=deadline)
+            rod = rod_passes(maze, arm.link_length, arm.link_radius, resolution=ROD, deadline=query.deadline)
             if rod.passes is Passage.NO:
                 proof = f"No rod of {arm.link_length:g} {maze.units} passes: this is proved."
             else:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import shapely
@@ -20,6 +21,9 @@ CELLS_PER_WIDTH = 12.0
 
 MANY_CELLS, FEWEST_CELLS_PER_WIDTH = 100_000, 6.0
 """In a wide hall with a narrow passage cells are larger, until these are all, but not larger than this."""
+
+MANY_CORNERS = 1000
+"""Walls of more corners than this are simplified for the width of the narrowest passage."""
 
 MAX_CELLS = 400_000
 """Largest number of grid cells in the bounding box; above it, cells are larger in any case."""
@@ -82,7 +86,7 @@ def passage_width(maze: Maze) -> float:
 
 
 def _disc_passes(maze: Maze, radius: float) -> bool:
-    centres = maze.free_space.buffer(-radius, quad_segs=4)
+    centres = _shrunk(maze.free_space, radius)
     reach = radius * (1.0 + 1e-9)
     base, goal = Point(maze.base_pose[:2]), Point(maze.goal)
     return any(
@@ -90,6 +94,24 @@ def _disc_passes(maze: Maze, radius: float) -> bool:
         for part in shapely.get_parts(centres)
         if not part.is_empty
     )
+
+
+def _shrunk(free_space: Any, radius: float) -> Any:
+    """Return where the centre of a disc may be; of walls in many pieces, to about a hundredth of the radius.
+
+    Pieces much shorter than the radius are slow to shrink at once, as the arcs round them all meet.
+    """
+    if shapely.get_num_coordinates(free_space) <= MANY_CORNERS:
+        return free_space.buffer(-radius, quad_segs=4)
+    for tolerance in (0.001, 0.005, 0.02):
+        free_space = free_space.simplify(tolerance * radius)
+        if shapely.get_num_coordinates(free_space) <= MANY_CORNERS:
+            break
+    done = 0.0
+    for share in (0.03, 0.15, 1.0):
+        free_space = free_space.buffer(done - share * radius, quad_segs=4).simplify(0.001 * radius)
+        done = share * radius
+    return free_space
 
 
 def laplace_potential(maze: Maze, *, width: float | None = None) -> Potential:

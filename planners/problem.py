@@ -199,6 +199,12 @@ class Motion:
                 f"it belongs to another maze."
             )
 
+    def moved(self, way: ArrayLike) -> Motion:
+        """Return the same motion with everything moved by a vector, shape (2,)."""
+        way = np.asarray(way, dtype=np.float64)
+        base_pose = np.concatenate([self.base_pose[:2] + way, self.base_pose[2:]])
+        return replace(self, joints=self.joints + way, base_pose=base_pose)
+
     def with_links(self, n_links: int) -> Motion:
         """Return the same motion of an arm with more links, which stay in the feeder.
 

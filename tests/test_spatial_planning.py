@@ -351,7 +351,7 @@ def test_a_motion_that_the_checker_refuses_is_never_handed_out(monkeypatch):
 
     def through_the_wall(query):
         joints = good.motion.joints + np.array([0.0, 0.0, 4.0]) * (good.motion.joints[..., :1] > 60.0)
-        motion = type(good.motion).from_joints(joints, 40.0, good.motion.base_pose)
+        motion = type(good.motion).from_joints(joints, 40.0, good.motion.base_pose).moved(-query.origin)
         return SpatialCandidate(status=PlanningStatus.SOLVED, motion=motion)
 
     monkeypatch.setitem(PLANNERS, "through", through_the_wall)

@@ -55,6 +55,21 @@ class Scene:
         )
 
     @cached_property
+    def far(self) -> float:
+        """What rounding of coordinates makes of a length, in maze units: some units in their last place."""
+        return 4.0 * float(np.finfo(np.float64).eps * np.abs(self.motion.joints).max())
+
+    @property
+    def length_slack(self) -> float:
+        """How far an exact link may be off its length, in maze units."""
+        return ROUNDING * self.length + self.far
+
+    @property
+    def place_slack(self) -> float:
+        """How far joints may be from where configuration, feeder and start put them, in maze units."""
+        return PLACE_SLACK * self.length + self.far
+
+    @cached_property
     def free(self) -> Geometry:
         """The free space."""
         return prepared(self.maze.free_space)

@@ -25,10 +25,9 @@ from hrsnake_env.arm import FloatArray
 from planners.kernels import spatial_track as kernel
 from planners.path import arclength, resampled
 from planners.problem import Failure, PlanningStatus
-from planners.spatial.entries import point_text
 from planners.spatial.problem import SpatialCandidate
 from planners.spatial.query import SpatialQuery, behind_straight
-from planners.spatial.track_planner import candidate_along, obstacle_text
+from planners.spatial.track_planner import candidate_along
 
 __all__ = ["HORIZON", "Grown", "grow_track", "plan_causal"]
 
@@ -261,12 +260,12 @@ def plan_causal(query: SpatialQuery, horizon: float = HORIZON) -> SpatialCandida
 def _reason(query: SpatialQuery, grown: Grown) -> str:
     """Say why a track does not reach the goal."""
     if grown.failure is None:
-        return f"Time was over before a track was shaped; its tip is at {point_text(grown.track[-1])}."
-    tip, units = point_text(grown.track[-1]), query.workspace.units
+        return f"Time was over before a track was shaped; its tip is at {query.text(grown.track[-1])}."
+    tip, units = query.text(grown.track[-1]), query.workspace.units
     link = f"the link of {query.arm.link_length:g} {units}"
     if grown.failure.wall is None:
         return f"The tip cannot advance beyond {tip}: the track of {link} winds without becoming free."
     return (
-        f"The tip cannot advance beyond {tip}: {link} that ends at {point_text(grown.failure.place)} is "
-        f"{grown.failure.depth:.3g} {units} deep in {obstacle_text(query.workspace, grown.failure.wall)}."
+        f"The tip cannot advance beyond {tip}: {link} that ends at {query.text(grown.failure.place)} is "
+        f"{grown.failure.depth:.3g} {units} deep in {query.obstacle_text(grown.failure.wall)}."
     )

@@ -120,11 +120,12 @@ def joints_from_configuration(
         raise InputError(f"Expected feed with shape ({n_poses},), got {feed.shape}.")
     position, axes = np.asarray(base_pose, dtype=np.float64)[:3], base_frame(base_pose)
     joints = np.empty((n_poses, n_links + 1, 3))
-    joints[:, 0] = position + (feed - n_links * link_length)[:, None] * axes[0]
+    joints[:, 0] = (feed - n_links * link_length)[:, None] * axes[0]
     frames = np.broadcast_to(axes, (n_poses, 3, 3))
     for k in range(n_links):
         frames = _bent(frames, angles[:, k])
         joints[:, k + 1] = joints[:, k] + link_length * frames[:, 0]
+    joints += position  # at last, so that far from the origin it is rounded only once
     return joints
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hrsnake_env.arguments import is_number
-from hrsnake_env.arm import ArmSpec
+from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.errors import InputError
 from planners.checking import Checker, Late
 from planners.problem import Attempt, Failure, PlanningStatus, Progress
@@ -71,7 +71,13 @@ def plan(
     Raises
     ------
     InputError
-        If the planner is unknown, the arm does not fit the feeder, or has fewer links than the motion needs.
+        If the planner is unknown, the arm does not fit the feeder, or has fewer links than the motion needs,
+        or the warm start is from another base or does not end at the goal.
+
+    Notes
+    -----
+    Planners see the workspace from its base, where coordinates are small: far from the origin, rounding would
+    be as large as what they look at. The motion is checked where it belongs.
 
     Examples
     --------
@@ -85,15 +91,17 @@ def plan(
     workspace.check_arm(arm)
     deadline = time.perf_counter() + time_budget
     bare = dataclasses.replace(arm, n_links=None)  # planners give as many links as the motion needs
+    seen, origin = _from_base(workspace)
     checker = Checker[SpatialMotion](
-        lambda motion, tell: validate(motion, workspace, bare, tell), deadline, progress
+        lambda motion, tell: validate(motion.moved(origin), workspace, bare, tell), deadline, progress
     )
     query = SpatialQuery(
-        workspace=workspace,
+        workspace=seen,
         arm=arm,
         deadline=deadline,
         check=checker,
-        warm_start=_warm(warm_start),
+        origin=origin,
+        warm_start=_warm(warm_start, workspace, origin),
         progress=progress,
     )
     attempts: list[Attempt] = []
@@ -113,7 +121,7 @@ def plan(
             stage: query.timings[stage] for stage in ("potential", "path") if stage in query.timings
         }
     assert first is not None
-    path = None if warm_start is not None or query.path is None else query.path.points
+    path = None if warm_start is not None or query.path is None else query.path.points + origin
     return dataclasses.replace(first, attempts=tuple(attempts), path=path)
 
 
@@ -129,12 +137,30 @@ def check_time_budget(time_budget: float) -> None:
         raise InputError(f"Expected a positive time_budget in seconds, got {time_budget!r}.")
 
 
-def _warm(result: SpatialResult | None) -> tuple[np.ndarray, float] | None:
+def _from_base(workspace: Workspace) -> tuple[Workspace, FloatArray]:
+    """Return the workspace as seen from its base, and the base; itself where rounding makes another of it."""
+    try:
+        return workspace.moved(-workspace.base), workspace.base
+    except InputError:
+        return workspace, np.zeros(3)
+
+
+def _warm(
+    result: SpatialResult | None, workspace: Workspace, origin: FloatArray
+) -> tuple[FloatArray, float] | None:
     if result is None:
         return None
     if result.motion is None or result.track is None:
         raise InputError("Expected a warm start with a motion and its track, got a result without.")
-    return result.track, result.motion.link_length
+    result.motion.check_workspace(workspace)
+    away = float(np.linalg.norm(result.track[-1] - workspace.goal))
+    if away > workspace.goal_radius:
+        raise InputError(
+            f"Expected a warm start that ends within {workspace.goal_radius:g} {workspace.units} of the goal "
+            f"of workspace '{workspace.name}', got one that ends {away:g} from it: it belongs to another "
+            f"workspace."
+        )
+    return result.track - origin, result.motion.link_length
 
 
 def _answer(name: str, query: SpatialQuery, checker: Checker[SpatialMotion]) -> SpatialResult:
@@ -147,8 +173,8 @@ def _answer(name: str, query: SpatialQuery, checker: Checker[SpatialMotion]) -> 
                 status=candidate.status,
                 planner=name,
                 reason=candidate.reason,
-                failure=candidate.failure,
-                track=candidate.track,
+                failure=_moved_failure(candidate.failure, query.origin),
+                track=_moved_track(candidate.track, query.origin),
             )
         motion = _with_wanted_links(candidate.motion, query).of_arm(query.arm)
         report = checker(motion)
@@ -157,11 +183,14 @@ def _answer(name: str, query: SpatialQuery, checker: Checker[SpatialMotion]) -> 
             status=PlanningStatus.OUT_OF_TIME,
             planner=name,
             reason="Time was over before the exact check of a motion was.",
-            failure=None if motion is None else Failure(place=tuple(motion.joints[-1, -1].tolist())),
+            failure=None
+            if motion is None
+            else Failure(place=tuple((motion.joints[-1, -1] + query.origin).tolist())),
         )
+    motion, track = motion.moved(query.origin), _moved_track(candidate.track, query.origin)
     if report.valid:
         return SpatialResult(
-            status=PlanningStatus.SOLVED, planner=name, motion=motion, report=report, track=candidate.track
+            status=PlanningStatus.SOLVED, planner=name, motion=motion, report=report, track=track
         )
     fault = min(report.faults, key=lambda one: one.kind not in ("penetration", "sweep"))
     return SpatialResult(
@@ -177,7 +206,25 @@ def _answer(name: str, query: SpatialQuery, checker: Checker[SpatialMotion]) -> 
             joints=motion.joints[fault.pose],
         ),
         report=report,
-        track=candidate.track,
+        track=track,
+    )
+
+
+def _at_end(motion: SpatialMotion) -> Failure:
+    return Failure(place=tuple(motion.joints[-1, -1].tolist()))
+
+
+def _moved_track(track: FloatArray | None, origin: FloatArray) -> FloatArray | None:
+    return None if track is None else track + origin
+
+
+def _moved_failure(failure: Failure | None, origin: FloatArray) -> Failure | None:
+    if failure is None:
+        return None
+    return dataclasses.replace(
+        failure,
+        place=tuple((np.asarray(failure.place) + origin).tolist()),
+        joints=_moved_track(failure.joints, origin),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -175,6 +176,12 @@ class SpatialMotion:
                 f"Expected a motion from the base of workspace '{workspace.name}' at {others}, got one from "
                 f"{mine}: it belongs to another workspace."
             )
+
+    def moved(self, way: ArrayLike) -> SpatialMotion:
+        """Return the same motion with everything moved by a vector, shape (3,)."""
+        way = np.asarray(way, dtype=np.float64)
+        base_pose = np.concatenate([self.base_pose[:3] + way, self.base_pose[3:]])
+        return dataclasses.replace(self, joints=self.joints + way, base_pose=base_pose)
 
     def with_links(self, n_links: int) -> SpatialMotion:
         """Return the same motion of an arm with more links, which stay in the feeder.

@@ -8,9 +8,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hrsnake_env.arm import ArmSpec, FloatArray
 from planners.problem import PlanningStatus, Progress, ValidationReport
+from planners.spatial.entries import point_text
 from planners.spatial.path import Path, global_path
 from planners.spatial.potential import laplace_potential
 from planners.spatial.problem import SpatialCandidate, SpatialMotion
@@ -36,7 +38,7 @@ class SpatialQuery:
     Parameters
     ----------
     workspace, arm
-        What is asked.
+        What is asked. The workspace is seen from `origin`, and so is all that planners hand on.
     deadline : float
         On the clock of `time.perf_counter`.
     check : callable
@@ -45,6 +47,8 @@ class SpatialQuery:
         The track of links of another length, from the base to the goal, and that length.
     progress : callable or None
         Called with stage and share done.
+    origin : array, shape (3,)
+        Where people have the place that is (0, 0, 0) here; `text` tells them of places.
     """
 
     workspace: Workspace
@@ -53,7 +57,17 @@ class SpatialQuery:
     check: Callable[[SpatialMotion], ValidationReport]
     warm_start: tuple[FloatArray, float] | None = None
     progress: Progress | None = None
+    origin: FloatArray = field(default_factory=lambda: np.zeros(3))
     timings: dict[str, float] = field(default_factory=dict)
+
+    def text(self, place: ArrayLike) -> str:
+        """Write a place for people."""
+        return point_text(np.asarray(place) + self.origin)
+
+    def obstacle_text(self, number: int) -> str:
+        """Write which obstacle is meant."""
+        low, high = self.workspace.obstacle_in_room(number)
+        return f"the obstacle from {self.text(low)} to {self.text(high)}"
 
     @property
     def late(self) -> bool:

@@ -25,7 +25,6 @@ from planners.kernels import feeding as feeding_kernel
 from planners.kernels import spatial_track as kernel
 from planners.path import arclength, resampled
 from planners.problem import Failure, PlanningStatus
-from planners.spatial.entries import point_text
 from planners.spatial.following import follow_path
 from planners.spatial.problem import SpatialCandidate, SpatialMotion
 from planners.spatial.query import SpatialQuery
@@ -34,7 +33,6 @@ from planners.spatial.workspace import Workspace
 __all__ = [
     "Track",
     "candidate_along",
-    "obstacle_text",
     "plan_track",
     "track_from_curve",
 ]
@@ -179,7 +177,7 @@ def candidate_along(query: SpatialQuery, curve: FloatArray) -> SpatialCandidate:
         status=PlanningStatus.DEAD_END,
         track=curve,
         reason=(
-            f"With the tip at {point_text(fed.place)} a joint would have to jump: the track turns across the "
+            f"With the tip at {query.text(fed.place)} a joint would have to jump: the track turns across the "
             f"link of {length:g} {query.workspace.units} that starts there."
         ),
         failure=Failure(place=fed.place, joints=fed.poses[-1]),
@@ -236,8 +234,8 @@ def _dead_end(query: SpatialQuery, track: Track) -> SpatialCandidate:
         status=PlanningStatus.DEAD_END,
         track=track.points,
         reason=(
-            f"No track was found on which {links} are free: the link that ends at {point_text(place)} is "
-            f"{depth:.3g} {units} deep in {obstacle_text(query.workspace, wall)}."
+            f"No track was found on which {links} are free: the link that ends at {query.text(place)} is "
+            f"{depth:.3g} {units} deep in {query.obstacle_text(wall)}."
         ),
         failure=Failure(
             place=place,
@@ -248,9 +246,3 @@ def _dead_end(query: SpatialQuery, track: Track) -> SpatialCandidate:
             joints=np.stack([rear, track.points[tip]]),
         ),
     )
-
-
-def obstacle_text(workspace: Workspace, number: int) -> str:
-    """Write which obstacle is meant."""
-    low, high = workspace.obstacle_in_room(number)
-    return f"the obstacle from {point_text(low)} to {point_text(high)}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 from dataclasses import dataclass, field
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.errors import InputError
@@ -186,6 +188,27 @@ class Workspace:
                 f"{point_text(self.goal)} with a radius of {self.goal_radius:g}: the arm meets it before it "
                 f"bends."
             )
+
+    def moved(self, way: ArrayLike) -> Workspace:
+        """Return the same workspace with everything in it moved by a vector, shape (3,).
+
+        Raises
+        ------
+        InputError
+            If something would lie elsewhere after rounding, like a thin box far from the origin.
+        """
+        way = np.asarray(way, dtype=np.float64)
+        assert self.boxes is not None
+        corners = ("low", "high", "window_low", "window_high")
+        return dataclasses.replace(
+            self,
+            **{key: getattr(self, key) + way for key in ("room_low", "room_high", "base", "goal")},
+            boxes=self.boxes + way,
+            panels=tuple(
+                dataclasses.replace(panel, **{key: getattr(panel, key) + way for key in corners})
+                for panel in self.panels
+            ),
+        )
 
     def base_pose_for(self, link_length: float) -> FloatArray:
         """Return the base for links of a length: position and unit heading, shape (6,).

@@ -6,7 +6,7 @@ import numpy as np
 
 from planners.checks.tolerances import ROUNDING, STEP_LIMIT
 from planners.problem import Fault
-from planners.spatial.checks.scene import PLACE_SLACK, Scene, joint_fault, worst_of
+from planners.spatial.checks.scene import Scene, joint_fault, worst_of
 from planners.spatial.kinematics import joints_from_configuration
 
 TURN_LIMIT = 1.0
@@ -17,7 +17,7 @@ def check_lengths(scene: Scene) -> tuple[float, Fault | None]:
     """Check that every link has its exact length; return the largest deviation too."""
     lengths = np.linalg.norm(np.diff(scene.motion.joints, axis=1), axis=2)
     amount, pose, link = worst_of(np.abs(lengths - scene.length))
-    if amount <= ROUNDING * scene.length:
+    if amount <= scene.length_slack:
         return amount, None
     figure = f"{lengths[pose, link]:.9g} {scene.workspace.units}"
     message = f"Link {link} is {figure} long at pose {pose}, not {scene.length:g}."
@@ -27,7 +27,7 @@ def check_lengths(scene: Scene) -> tuple[float, Fault | None]:
 def check_consistency(scene: Scene) -> Fault | None:
     """Check that the joints are where feed and joint angles put them."""
     amount, pose, joint = worst_of(np.linalg.norm(scene.motion.joints - scene.placed, axis=2))
-    if amount <= PLACE_SLACK * scene.length:
+    if amount <= scene.place_slack:
         return None
     message = (
         f"Joint {joint} is {scene.figure(amount)} from where feed and joint angles put it at pose {pose}."
@@ -40,12 +40,12 @@ def check_feeder(scene: Scene) -> Fault | None:
     motion, whole = scene.motion, scene.motion.n_links * scene.length
     excess = np.maximum(motion.feed - whole, -motion.feed)
     pose = int(np.argmax(excess))
-    if excess[pose] > PLACE_SLACK * scene.length:
+    if excess[pose] > scene.place_slack:
         message = (
             f"The feed is {scene.figure(motion.feed[pose])} at pose {pose}, not between 0 and {whole:g}."
         )
         return joint_fault(scene, "feeder", message, pose, 0, float(excess[pose]))
-    behind = scene.arc[:, :-1] < -ROUNDING * scene.length
+    behind = scene.arc[:, :-1] < -scene.length_slack
     # A link is held until its base-side joint has passed, so still at the pose after one with the joint
     # behind; and likewise on the way back.
     held = behind.copy()
@@ -59,7 +59,7 @@ def check_feeder(scene: Scene) -> Fault | None:
     aside = np.where(held, aside, 0.0)
     aside[:, 0] = np.maximum(aside[:, 0], across[:, 0])
     amount, pose, link = worst_of(aside)
-    if amount <= PLACE_SLACK * scene.length:
+    if amount <= scene.place_slack:
         return None
     message = f"Link {link}, still held by the feeder, is {scene.figure(amount)} off its axis at pose {pose}."
     return joint_fault(scene, "feeder", message, pose, link, amount)
@@ -72,7 +72,7 @@ def check_start(scene: Scene) -> Fault | None:
     wanted = joints_from_configuration([0.0], straight, scene.length, motion.base_pose)[0]
     distances = np.linalg.norm(motion.joints[0] - wanted, axis=1)
     joint = int(np.argmax(distances))
-    if distances[joint] <= PLACE_SLACK * scene.length:
+    if distances[joint] <= scene.place_slack:
         return None
     amount = float(distances[joint])
     message = f"Joint {joint} starts {scene.figure(amount)} from its place with the whole arm in the feeder."

@@ -102,6 +102,21 @@ class Scene:
         return ROUNDING * self.length + 100.0 * float(np.finfo(np.float64).eps * size)
 
     @cached_property
+    def far(self) -> float:
+        """What rounding of coordinates makes of a length: some units in their last place."""
+        return 4.0 * float(np.finfo(np.float64).eps * np.abs(self.motion.joints).max())
+
+    @property
+    def length_slack(self) -> float:
+        """How far an exact link may be off its length, in workspace units."""
+        return ROUNDING * self.length + self.far
+
+    @property
+    def place_slack(self) -> float:
+        """How far joints may be from where configuration, feeder and start put them (workspace units)."""
+        return PLACE_SLACK * self.length + self.far
+
+    @cached_property
     def arc(self) -> FloatArray:
         """How far past the base each joint is along the arm, shape (n_poses, n_links + 1)."""
         return self.arc_from_feed(self.motion.feed)
