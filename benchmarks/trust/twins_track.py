@@ -390,7 +390,10 @@ def goal_row_agrees(rng):
     nearer = (apart - np.hypot(*(goal - points[4] - 1e-7 * way))) / 1e-7
     np.testing.assert_allclose(rows.factor[1, 0] @ way, nearer, atol=1e-4)
     np.testing.assert_array_equal(rows.samples[1], [4] + [-1] * (ROW_WIDTH - 1))
-    assert rows.wanted[1] == min(apart - radius, LONGEST_MOVE) and rows.weight[1] == track.GOAL_WEIGHT
+    assert (
+        abs(rows.wanted[1] - min(apart - radius, LONGEST_MOVE)) < ROUNDING
+        and rows.weight[1] == track.GOAL_WEIGHT
+    )
     assert track.goal_row(4, points, points[4].copy(), radius, 1, rows) == 1
 
 
