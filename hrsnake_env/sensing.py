@@ -182,9 +182,13 @@ def _ray(x: float, y: float, heading: float, walls: FloatArray, reach: float) ->
         across = dx * ey - dy * ex
         if across == 0.0:
             continue
+        # From each end by itself, so that two walls that share it agree and no ray slips between them.
+        bx, by = walls[w, 2] - x, walls[w, 3] - y
+        start, end = ax * dy - ay * dx, bx * dy - by * dx
+        if (start > 0.0 and end > 0.0) or (start < 0.0 and end < 0.0):
+            continue
         along = (ax * ey - ay * ex) / across
-        share = (ax * dy - ay * dx) / across
-        if 0.0 <= share <= 1.0 and 0.0 <= along < nearest:
+        if 0.0 <= along < nearest:
             nearest = along
     return nearest
 

@@ -77,35 +77,34 @@ def feed(
         Segments, in maze units, in the plane alone; if given, feeding ends at the first pose that meets one
         of them or itself. That is before the first pose if chords that end at points of the track do.
     """
-    # Seen from the base: far from the origin, rounding would be larger than what tells joints apart.
-    origin: FloatArray = track[0].copy()
-    base_pose = np.concatenate([base_pose[: len(origin)] - origin, base_pose[len(origin) :]])
-    track, arc = _subdivided(track - origin, link_length)
+    # About the base: far from the origin, rounding would be more than links are exact to.
+    base, heading = kernel.feeder_axis(base_pose)
+    centred = base_pose.astype(np.float64)
+    centred[: len(base)] = 0.0
+    track, arc = _subdivided(track - base, link_length)
     sweep = UNCHECKED
     if walls is not None:
-        free, found = sweep_chords(track, arc, link_length, walls - origin)
+        free, found = sweep_chords(track, arc, link_length, walls - base)
         sweep = Sweep(*found)
         if not free:
-            return Feeding(poses=np.empty((0, 0, 2)), ending=kernel.MEETS, place=tuple(origin.tolist()))
+            return Feeding(poses=np.empty((0, 0, 2)), ending=kernel.MEETS, place=tuple(base.tolist()))
     n_links = kernel.links_at_end(track, arc, link_length)
     if n_links < 0:
         n_links = math.floor(arc[-1] / link_length) + 2
     room = POSES_PER_LINK * n_links
     while True:
         poses = np.empty((room, n_links + 1, track.shape[1]))
-        n, ending = kernel.feed_along(track, arc, link_length, base_pose, step * link_length, sweep, poses)
+        n, ending = kernel.feed_along(track, arc, link_length, centred, step * link_length, sweep, poses)
         if ending != kernel.FULL or room >= MOST_POSES_PER_LINK * n_links:
             break
         room = min(4 * room, MOST_POSES_PER_LINK * n_links)
     poses = poses[:n]
     # Links that never leave the feeder are not needed: those behind the base at the end.
-    base, heading = kernel.feeder_axis(base_pose)
-    offset = poses[-1] - base
-    along = offset @ heading
-    aside = np.linalg.norm(offset - along[:, None] * heading, axis=1)
+    along = poses[-1] @ heading
+    aside = np.linalg.norm(poses[-1] - along[:, None] * heading, axis=1)
     inside = (along <= 1e-9 * link_length) & (aside <= 1e-9 * link_length)
     unused = int(np.argmin(inside[1:]))
-    poses = poses[:, unused:] + origin
+    poses = poses[:, unused:] + base
     return Feeding(poses=poses, ending=ending, place=tuple(poses[-1, -1].tolist()))
 
 

@@ -57,6 +57,9 @@ def scan_walls(
             y = ay + (i - ax) * (by - ay) / (bx - ax)
             blocked_y[int(np.floor(y)), i] = True
             on_wall[int(np.rint(y)), i] |= abs(y - np.rint(y)) < ON_WALL
+        # Neither wall at a corner that is above and right of both counts it.
+        i, j = int(np.rint(bx)), int(np.rint(by))
+        on_wall[j, i] |= abs(bx - i) < ON_WALL and abs(by - j) < ON_WALL
     for j in range(ny):
         for i in range(1, nx):
             inside[j, i] ^= inside[j, i - 1]

@@ -38,9 +38,14 @@ def cast_rays(origins: FloatArray, directions: FloatArray, walls: FloatArray, le
             cross = dx * ey - dy * ex
             if abs(cross) < PARALLEL:
                 continue
-            along_wall = (ax * dy - ay * dx) / cross
-            if 0.0 <= along_wall <= 1.0:
-                along_ray = (ax * ey - ay * ex) / cross
-                if 0.0 <= along_ray < best:
-                    best = along_ray
+            # From each end by itself, so that two walls that share it agree and no ray slips between them.
+            bx, by = walls[k, 1, 0] - px, walls[k, 1, 1] - py
+            start, end = ax * dy - ay * dx, bx * dy - by * dx
+            if (start > 0.0 and end > 0.0) or (start < 0.0 and end < 0.0):
+                continue
+            # A place between the ends, however near to parallel the wall is.
+            share = start / (start - end) if start != end else 0.0
+            along_ray = (ax + share * ex) * dx + (ay + share * ey) * dy
+            if 0.0 <= along_ray < best:
+                best = along_ray
         lengths[n] = best

@@ -33,20 +33,18 @@ def chord_errors(points: FloatArray, length: float) -> tuple[float, float]:
     length : float
         Of a chord.
     """
-    link_to_path, path_to_link, k = 0.0, 0.0, 0
+    link_to_path, path_to_link = 0.0, 0.0
     for i in range(1, points.shape[0]):
-        apart = 0.0
-        for c in range(3):
-            apart += (points[0, c] - points[i, c]) ** 2
-        if k == 0 and apart < length * length:
-            continue
-        while k + 1 < i:
+        k = i
+        while k >= 0:
             apart = 0.0
             for c in range(3):
-                apart += (points[k + 1, c] - points[i, c]) ** 2
-            if apart < length * length:
+                apart += (points[k, c] - points[i, c]) ** 2
+            if apart >= length * length:
                 break
-            k += 1
+            k -= 1
+        if k < 0:
+            continue
         ax, ay, az = points[k, 0], points[k, 1], points[k, 2]
         bx, by, bz = points[i, 0], points[i, 1], points[i, 2]
         for j in range(k, i + 1):

@@ -193,7 +193,8 @@ def rise(log_u: FloatArray, x: float, y: float, z: float) -> tuple[float, float,
     Returns
     -------
     log_u, dx, dy, dz : float
-        All zero, and the logarithm minus infinity, where u is 0 at all eight corners or off the grid.
+        All zero, and the logarithm minus infinity, where u is 0 at all eight corners, off the grid, and
+        where u is flat.
     """
     i, j, k = math.floor(x), math.floor(y), math.floor(z)
     nx, ny, nz = log_u.shape

@@ -89,20 +89,25 @@ def _cell_of(x: float, y: float, near: Surroundings) -> int:
 
 @njit(cache=True, inline="always")
 def _meets_near(ax: float, ay: float, bx: float, by: float, near: Surroundings) -> bool:
-    """Tell whether the segment a-b, no longer than the reach, meets a wall."""
-    cell = _cell_of(ax, ay, near)
+    """Tell whether the segment a-b meets a wall."""
     meets, walls = False, near.walls
-    for at in range(near.first[cell], near.first[cell + 1]):
-        w = near.members[at]
-        if segments_meet(ax, ay, bx, by, walls[w, 0, 0], walls[w, 0, 1], walls[w, 1, 0], walls[w, 1, 1]):
-            meets = True
+    # No place of the segment is farther than the reach from one at which the lists are looked up.
+    parts = max(int(max(abs(bx - ax), abs(by - ay)) / REACH) + 1, 1)
+    for part in range(parts):
+        cell = _cell_of(ax + part / parts * (bx - ax), ay + part / parts * (by - ay), near)
+        for at in range(near.first[cell], near.first[cell + 1]):
+            w = near.members[at]
+            if segments_meet(ax, ay, bx, by, walls[w, 0, 0], walls[w, 0, 1], walls[w, 1, 0], walls[w, 1, 1]):
+                meets = True
+                break
+        if meets:
             break
     return meets
 
 
 @njit(cache=True)
 def edges_are_free(points: FloatArray, first: int, near: Surroundings) -> bool:
-    """Tell whether no wall meets the track, shape (n, 2), from a sample on; edges are within the reach."""
+    """Tell whether no wall meets the track, shape (n, 2), from a sample on."""
     for i in range(first, points.shape[0] - 1):
         if _meets_near(points[i, 0], points[i, 1], points[i + 1, 0], points[i + 1, 1], near):
             return False
