@@ -6,6 +6,7 @@ The rules themselves have their twins in `tests/test_beam_rules.py`.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from functools import cache
 
@@ -21,7 +22,19 @@ from planners.kernels.beam_types import AXIS, EDGE, NOTHING, PATH, POINTS, TANGE
 from planners.query import Query
 
 NUMBER_OF_MAZES = 4
-FIELDS = ("heading", "x", "y", "choice", "target", "corner", "blocked", "closest", "aimed", "jumped", "pieces")
+FIELDS = (
+    "heading",
+    "x",
+    "y",
+    "choice",
+    "target",
+    "corner",
+    "blocked",
+    "closest",
+    "aimed",
+    "jumped",
+    "pieces",
+)
 
 
 @cache
@@ -129,7 +142,11 @@ def links_in_the_feeder_lie_on_its_axis(rng):
     """beam_arm.place_reference_link and place_upstream_links."""
     n, length = int(rng.integers(2, 9)), rng.uniform(1.0, 300.0)
     base = np.append(rng.uniform(-1e3, 1e3, 2), rng.uniform(-4, 4))
-    links, reference, axial = np.recarray(n, dtype=a_fed_arm(rng, 1).links.dtype), int(rng.integers(0, n)), 0.0
+    links, reference, axial = (
+        np.recarray(n, dtype=a_fed_arm(rng, 1).links.dtype),
+        int(rng.integers(0, n)),
+        0.0,
+    )
     links.fill(0)
     axial = rng.uniform(0.0, length)
     beam_arm.place_reference_link(links, reference, axial, base)
@@ -218,10 +235,7 @@ def an_arm_is_fed_in_small_steps_and_the_same_in_parts_as_at_once(rng):
         ahead = np.stack([np.cos(row[:out]), np.sin(row[:out])], axis=1)[::-1] * length
         start = base[:2] + (feed - out * length) * np.array([math.cos(base[2]), math.sin(base[2])])
         joints.append((start + np.cumsum(ahead, axis=0))[::-1])
-    steps = [
-        np.hypot(*(b[: len(a)] - a[: len(b)]).T).max(initial=0.0)
-        for a, b in zip(joints[:-1], joints[1:], strict=True)
-    ]
+    steps = [np.hypot(*(b[: len(a)] - a[: len(b)]).T).max(initial=0.0) for a, b in itertools.pairwise(joints)]
     assert (np.diff(whole.feeds[:n]) > 0.0).all()
     assert not chosen.clamp or max(steps, default=0.0) <= step * (1.0 + 1e-9)
     tip = math.dist(joints[-1][0], geometry.maze.goal) if len(joints[-1]) else math.inf

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import shapely
 
-from benchmarks.trust.twin_draws import distances_to, lines, on_grid, segments, some_walls, star, walls_of
+from benchmarks.trust.twin_draws import distances_to, on_grid, segments, some_walls, star, walls_of
 from hrsnake_env.arm import joints_from_configuration
 from planners.kernels import fed_arm, fed_growth, fed_shortcut
 
@@ -137,7 +138,7 @@ def the_room_around_is_counted_move_by_move(rng):
 def joints_moved(poses, scene):
     """Return the largest movement between poses of a joint in front of the base in both, and of the feed."""
     moved = [0.0]
-    for one, other in zip(poses[:-1], poses[1:], strict=True):
+    for one, other in itertools.pairwise(poses):
         before, after = points_of(one, scene)[1:], points_of(other, scene)[1:]
         n = min(len(before), len(after))
         if n:
@@ -183,7 +184,7 @@ def an_edge_that_is_clear_is_so_at_all_places_and_one_well_off_is_clear(rng):
     b[0] = np.clip(b[0], 0.0, 3.0)
     poses = fed_arm.edge_poses(a, b, scene)
     worst = math.inf
-    for one, other in zip(poses[:-1], poses[1:], strict=True):
+    for one, other in itertools.pairwise(poses):
         for share in (0.0, 0.35, 0.7, 1.0):  # between poses, feed and angles change linearly
             points = points_of(one + share * (other - one), scene)
             worst = min(worst, clear_by_how_much(points, np.full(len(points), scene.margin), scene))
@@ -314,19 +315,11 @@ def paths_are_as_long_as_their_edges_and_shortcuts_no_longer(rng):
     short = fed_shortcut.shortcut(path, rng.random((20, 2)), scene)
     np.testing.assert_array_equal(short[[0, -1]], path[[0, -1]])
     assert np.linalg.norm(np.diff(short, axis=0), axis=1).sum() <= length + 1e-12
-    for one, other in zip(short[:-1], short[1:], strict=True):
+    for one, other in itertools.pairwise(short):
         for share in np.linspace(0.0, 1.0, 7):
             points = points_of(one + share * (other - one), scene)
             assert clear_by_how_much(points, np.full(len(points), scene.margin), scene) > -1e-9
     return None
-
-
-def a_wall_is_met_where_lines_meet(rng):
-    """The union of walls that the other laws stand on holds each of them (a law of the twin itself)."""
-    walls = some_walls(rng)
-    if len(walls):
-        middles = walls.mean(axis=1)
-        assert shapely.distance(lines(walls), shapely.points(middles)).max() < 1e-12
 
 
 LAWS = (
@@ -341,5 +334,4 @@ LAWS = (
     the_farthest_point_seen_is_the_last_in_the_window,
     grown_links_are_free_lead_on_and_are_written_down_rightly,
     paths_are_as_long_as_their_edges_and_shortcuts_no_longer,
-    a_wall_is_met_where_lines_meet,
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from functools import cache
 
@@ -9,7 +10,7 @@ import numpy as np
 import shapely
 from scipy.interpolate import RegularGridInterpolator
 
-from benchmarks.trust.twin_draws import distances_to, segments, some_walls, star, walls_of
+from benchmarks.trust.twin_draws import distances_to, segments, star, walls_of
 from hrsnake_env.arm import ArmSpec, joints_from_configuration
 from hrsnake_env.maze import Maze
 from planners.baselines.field_runs import Gains, base_frame, new_run, new_task
@@ -343,8 +344,7 @@ def a_chain_led_along_a_curve_moves_in_small_steps(rng):
         turned = np.column_stack([np.cos(row[:past]), np.sin(row[:past])])[::-1]
         joints_of.append(np.concatenate([[ahead], ahead + np.cumsum(turned, axis=0)])[::-1])
     np.testing.assert_allclose(joints[: len(joints_of[-1])], joints_of[-1], atol=1e-9)
-    at_a_pose = len(joints_of) - 1
-    for one, other in zip(joints_of[:at_a_pose], joints_of[1:], strict=True):
+    for one, other in itertools.pairwise(joints_of):
         both = min(len(one), len(other))
         assert np.hypot(*(one[:both] - other[:both]).T).max() <= step + 1e-9
     away = math.dist(joints_of[-1][0], goal)

@@ -6,6 +6,7 @@ returns False where what is drawn is no case.
 
 from __future__ import annotations
 
+import itertools
 import math
 from functools import cache
 
@@ -215,7 +216,7 @@ def doubtful_ways(space, task):
             gap = space.possible[t, h]
             if window is not None and meet(gap, window):
                 graph.add_edge((t, h), "goal")
-            if at_base[t] and meet(gap + (-slack, slack), (task.heading, task.heading)):
+            if at_base[t] and meet(gap + np.array([-slack, slack]), (task.heading, task.heading)):
                 graph.add_edge((t, h), "base")
             for other in space.neighbours[t][space.neighbours[t] > t]:
                 for g in range(space.n_possible[other]):
@@ -242,7 +243,7 @@ def the_search_finds_a_way_where_possible_headings_are_joined(rng):
         return None
     assert way[0] == rod_search.GOAL and way[n - 1] == rod_search.BASE and len(set(way[:n])) == n
     triangles, kinds = np.divmod(way[1 : n - 1] - rod_search.FIRST, 2 * GAPS)
-    for one, other in zip(triangles[:-1], triangles[1:], strict=True):
+    for one, other in itertools.pairwise(triangles):
         assert one == other or other in space.neighbours[one]
     doubts = triangles[(kinds < GAPS) & (space.sizes[triangles] > task.resolution)]
     np.testing.assert_array_equal(frontier.doubts[: frontier.used[2]], doubts)
@@ -253,7 +254,7 @@ def rods_are_free(maze, places, length):
     """Tell whether a rod's moves and turns stay in the free space: areas swept, and dense turns."""
     grown = maze.free_space.buffer(1e-7 * maze.size)
     shapely.prepare(grown)
-    for (x, y, before), (u, v, after) in zip(places[:-1], places[1:], strict=True):
+    for (x, y, before), (u, v, after) in itertools.pairwise(places):
         assert (x, y) == (u, v) or before == after
         turned = np.linspace(before, after, 2 + int(abs(after - before) / 0.02))
         tips = np.array([x, y]) + length * unit(turned)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from functools import cache
 
@@ -52,7 +53,7 @@ def substeps_are_linear_and_straight_in_the_feeder(rng):
     parts = dynamics.divide(start, end, length, largest, again)
     np.testing.assert_array_equal(again, targets)
     joints = [joints_of(row, length) for row in (start, *targets)]
-    moved = max(np.hypot(*(b - a).T).max() for a, b in zip(joints[:-1], joints[1:], strict=True))
+    moved = max(np.hypot(*(b - a).T).max() for a, b in itertools.pairwise(joints))
     assert abs(moved / largest - parts) < 1.0 + 1e-9 and parts >= moved / largest - 1e-9
     assert abs(dynamics.largest_move(start, targets, length) - moved) < 1e-9 * length
 
@@ -134,7 +135,9 @@ def limited_torques_keep_the_limit_and_coast_or_reach(rng):
     assert np.isfinite(forces).all() and (np.abs(torques) <= limit * (1 + 1e-12)).all()
     free, whole = np.zeros((n, 3)), np.zeros(n)
     feed = dynamics.servo_forces(state, poses, length, timestep, held, free, whole)
-    dynamics.drive(aim, target, state, length, timestep, math.inf, held, poses, nodes, forces, torques, effort)
+    dynamics.drive(
+        aim, target, state, length, timestep, math.inf, held, poses, nodes, forces, torques, effort
+    )
     np.testing.assert_allclose(forces, free)
     np.testing.assert_allclose(effort, np.append(feed, whole))
     np.testing.assert_allclose(nodes, joints_of(aim, length), atol=1e-9 * length)
@@ -247,7 +250,11 @@ def links_are_as_far_from_walls_as_shapely_says(rng):
 def readings_are_those_of_the_arm_in_maze_units(rng):
     """sensing.read_arm."""
     walls, target, joints, held, state = around_an_arm(rng)
-    n, radius, frame = len(state), rng.uniform(0.0, 0.2), np.append(rng.normal(size=3), 10.0 ** rng.uniform(-2, 2))
+    n, radius, frame = (
+        len(state),
+        rng.uniform(0.0, 0.2),
+        np.append(rng.normal(size=3), 10.0 ** rng.uniform(-2, 2)),
+    )
     touched = rng.choice([math.inf, 0.05, -0.01], n)
     angles, speeds, clearances = (np.full(n, np.nan) for _ in range(3))
     readings = np.full(sensing.N_READINGS, np.nan)
@@ -321,7 +328,10 @@ def an_observation_is_scaled_and_cut_part_by_part(rng):
     target = np.append(feed, angles) + 0.02 * rng.normal(size=n + 1)
     scales, base = np.array([link, 0.02 * link, 0.05, limit]), rng.normal(size=3)
     goal, with_goal = reach * rng.normal(size=2), bool(rng.random() < 0.5)
-    ahead, rays = tip + link * rng.normal(size=(len(observation.AHEAD), 2)), rng.random(rng.choice([0, 8 + 2 * n]))
+    ahead, rays = (
+        tip + link * rng.normal(size=(len(observation.AHEAD), 2)),
+        rng.random(rng.choice([0, 8 + 2 * n])),
+    )
     distance = rng.uniform(0.0, 1.5)
     parts = observation.observation_parts(n, goal=with_goal, rays=len(rays) > 0)
     out = np.full(sum(number for number, _ in parts.values()), np.nan, dtype=np.float32)
