@@ -21,6 +21,7 @@ def module_name(path):
     return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
 
 
+@cache
 def modules():
     """Return the sources of both packages by name of the module."""
     return {module_name(path): path for package in PACKAGES for path in (ROOT / package).rglob("*.py")}
@@ -36,6 +37,7 @@ def is_kernel(node):
     return "njit" in names
 
 
+@cache
 def kernels():
     """Return the definition of each kernel by (module, name)."""
     return {
@@ -61,6 +63,7 @@ def imported(path):
     return meaning
 
 
+@cache
 def source_of(module, name):
     """Follow a name through the modules that only hand it on, to where it is defined."""
     path = modules().get(module)
