@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks.trust.kernel_twins import LAWS, SHARE
-from benchmarks.trust.twin_draws import TURN, walls_of
+from benchmarks.trust.twin_draws import TURN, star, walls_of
 from benchmarks.trust.twins_rod import bare_space
 from hrsnake_env.sensing import N_TIP_RAYS, TIP_RAYS, cast_rays
 from planners.kernels.fed_arm import keeps_off
@@ -62,10 +62,9 @@ def test_the_nearest_wall_counts_where_there_is_room_for_no_contact():
 
 def test_no_ray_slips_through_a_corner():
     rays, joints, state = np.empty(N_TIP_RAYS + 2), np.zeros((2, 2)), np.zeros((1, 6))
-    for n in range(5, 60):
-        angles = TURN * np.arange(n) / n + 0.1 * n
-        ring = np.column_stack([np.cos(angles), np.sin(angles)])
-        for angle in angles:
-            state[0, 2] = angle - TIP_RAYS[0]
-            cast_rays(state, joints, 1, walls_of(ring).reshape(-1, 4), 2.0, rays)
-            assert rays[0] == pytest.approx(0.5)
+    for seed in range(60):
+        ring = star(np.random.default_rng(seed), n=9)
+        for corner in ring:
+            state[0, 2] = math.atan2(corner[1], corner[0]) - TIP_RAYS[0]
+            cast_rays(state, joints, 1, walls_of(ring).reshape(-1, 4), 20.0, rays)
+            assert rays[0] == pytest.approx(np.hypot(*corner) / 20.0)
