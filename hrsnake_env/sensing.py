@@ -173,21 +173,20 @@ def read_arm(
 
 @numba.njit(cache=True)
 def _ray(x: float, y: float, heading: float, walls: FloatArray, reach: float) -> float:
-    """Compute the distance from a point to the first wall in a direction, at most `reach`."""
+    """Compute the distance from a point to the first wall in a direction, at most `reach`.
+
+    On which side of the ray a corner is, is computed alike for both its walls: no ray slips through there.
+    """
     dx, dy = math.cos(heading), math.sin(heading)
     nearest = reach
     for w in range(walls.shape[0]):
         ax, ay = walls[w, 0] - x, walls[w, 1] - y
-        ex, ey = walls[w, 2] - walls[w, 0], walls[w, 3] - walls[w, 1]
-        across = dx * ey - dy * ex
-        if across == 0.0:
-            continue
-        # From each end by itself, so that two walls that share it agree and no ray slips between them.
         bx, by = walls[w, 2] - x, walls[w, 3] - y
-        start, end = ax * dy - ay * dx, bx * dy - by * dx
-        if (start > 0.0 and end > 0.0) or (start < 0.0 and end < 0.0):
+        side_a, side_b = ax * dy - ay * dx, bx * dy - by * dx
+        if side_a == side_b or (side_a > 0.0 and side_b > 0.0) or (side_a < 0.0 and side_b < 0.0):
             continue
-        along = (ax * ey - ay * ex) / across
+        along_a, along_b = ax * dx + ay * dy, bx * dx + by * dy
+        along = along_a + side_a / (side_a - side_b) * (along_b - along_a)
         if 0.0 <= along < nearest:
             nearest = along
     return nearest

@@ -137,7 +137,7 @@ def keeps_off(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, need: 
         min(squared_distance(a, c, d), squared_distance(b, c, d)),
         min(squared_distance(c, a, b), squared_distance(d, a, b)),
     )
-    return bool(least >= need * need)
+    return bool(least > 0.0 and least >= need * need)  # segments in line that overlap are at 0, too
 
 
 @njit(cache=True)

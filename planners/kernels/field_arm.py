@@ -192,17 +192,20 @@ def fill_drag(
 @njit(cache=True)
 def _contact(
     px: float, py: float, wx: float, wy: float, link: int, reach: float, n: int, contacts: FloatArray
-) -> int:
-    """Note the contact of a point of a link with the place of a wall that is nearest to it."""
+) -> tuple[int, float]:
+    """Note the contact of a point of a link with the place of a wall that is nearest to it, if there is room.
+
+    Returns the number of contacts, and the distance.
+    """
     dx, dy = px - wx, py - wy
-    gap = np.hypot(dx, dy)
+    gap = float(np.hypot(dx, dy))
     if gap >= reach or n == contacts.shape[0]:
-        return n
+        return n, gap
     scale = 1.0 / max(gap, 1e-12)
     contacts[n, 0], contacts[n, 1] = px, py
     contacts[n, 2], contacts[n, 3] = dx * scale, dy * scale
     contacts[n, 4], contacts[n, 5] = gap, link
-    return n + 1
+    return n + 1, gap
 
 
 @njit(cache=True)
@@ -227,7 +230,8 @@ def find_contacts(
     n : int
         Number of contacts.
     least : float
-        Smallest distance, 0 where a link crosses a wall; `reach` without contacts.
+        Smallest distance, also of contacts for which there was no room; 0 where a link crosses a wall; `reach`
+        without contacts.
     """
     n, least = 0, reach
     for link in range(k, 0, -1):
@@ -242,18 +246,17 @@ def find_contacts(
             if min(cy, ey) > max(ay, by) + reach or max(cy, ey) < min(ay, by) - reach:
                 continue
             wx, wy = ex - cx, ey - cy
-            before = n
             # The end of the link against the wall; the other end belongs to the link behind.
             along = ((bx - cx) * wx + (by - cy) * wy) / max(wx * wx + wy * wy, 1e-300)
             if 0.0 <= along <= 1.0:
-                n = _contact(bx, by, cx + along * wx, cy + along * wy, link, reach, n, contacts)
+                n, gap = _contact(bx, by, cx + along * wx, cy + along * wy, link, reach, n, contacts)
+                least = min(least, gap)
             # The wall's start against the link; its end is another wall's start.
             share = ux * (cx - ax) + uy * (cy - ay)
             if share > 0.0:
                 share = min(share, 1.0)
-                n = _contact(ax + share * ux, ay + share * uy, cx, cy, link, reach, n, contacts)
-            for k_new in range(before, n):
-                least = min(least, contacts[k_new, 4])
+                n, gap = _contact(ax + share * ux, ay + share * uy, cx, cy, link, reach, n, contacts)
+                least = min(least, gap)
             of_c, of_e = ux * (cy - ay) - uy * (cx - ax), ux * (ey - ay) - uy * (ex - ax)
             of_a, of_b = wx * (ay - cy) - wy * (ax - cx), wx * (by - cy) - wy * (bx - cx)
             if of_c * of_e < 0.0 and of_a * of_b < 0.0:

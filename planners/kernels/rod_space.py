@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from planners.kernels.rod import TWO_PI, free_directions
+from planners.kernels.rod import TWO_PI, WHOLE_TURN, free_directions
 from planners.kernels.types import BoolArray, FloatArray, IntArray
 
 GAPS = 16
@@ -407,7 +407,9 @@ def update_headings(space: RodSpace, length: float, every: bool) -> None:
         for k in range(n_gaps):
             for h in range(space.n_possible[t]):
                 start, end = beside(gaps[k, 0], gaps[k, 1], space.possible[t, h, 0], space.possible[t, h, 1])
-                if start <= gaps[k, 0] and gaps[k, 1] <= end and space.n_exact[t] < GAPS:
+                # All headings hold any interval: where they begin means nothing.
+                holds = end - start >= WHOLE_TURN or (start <= gaps[k, 0] and gaps[k, 1] <= end)
+                if holds and space.n_exact[t] < GAPS:
                     space.exact[t, space.n_exact[t]] = gaps[k]
                     space.around[t, space.n_exact[t]] = h
                     space.n_exact[t] += 1
