@@ -230,8 +230,8 @@ def find_contacts(
     n : int
         Number of contacts.
     least : float
-        Smallest distance, also of contacts for which there was no room; 0 where a link crosses a wall; `reach`
-        without contacts.
+        Smallest distance, also of contacts for which there was no room; 0 where a link crosses a wall;
+        `reach` without contacts.
     """
     n, least = 0, reach
     for link in range(k, 0, -1):
