@@ -443,7 +443,7 @@ def _unsolved(track: _Track, scene: Scene, query: Query, timings: Mapping[str, f
         status=PlanningStatus.OUT_OF_TIME if query.late else PlanningStatus.DEAD_END,
         reason=f"The joint track is not free near ({x:.1f}, {y:.1f}) {scene.maze.units}{late}: {why}.",
         failure=Failure(
-            place=(x, y), path_position=path_position, depth=depth, wall=wall_nearest_to(scene.maze, (x, y))
+            place=(x, y), path_position=path_position, depth=depth, wall=wall_nearest_to(query.maze, (x, y))
         ),
         timings=timings,
     )

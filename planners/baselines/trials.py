@@ -103,7 +103,7 @@ def best_of(query: Query, geometry: Geometry, trials: Iterable[Trial]) -> Candid
         if query.late:
             break
     if best is None and stuck is not None:
-        return _dead_end(geometry, begin, stuck)
+        return _dead_end(query, geometry, begin, stuck)
     return _answer(geometry, begin, best)
 
 
@@ -119,12 +119,12 @@ def _answer(geometry: Geometry, begin: float, motion: Motion | None) -> Candidat
     return Candidate(status=PlanningStatus.SOLVED, motion=motion, timings=_timings(geometry, begin))
 
 
-def _dead_end(geometry: Geometry, begin: float, stuck: Stuck) -> Candidate:
+def _dead_end(query: Query, geometry: Geometry, begin: float, stuck: Stuck) -> Candidate:
     x, y = (float(value) for value in stuck.joints[-1])
     return Candidate(
         status=PlanningStatus.DEAD_END,
         reason=f"With the tip at ({x:.1f}, {y:.1f}) {geometry.maze.units}, {stuck.why}.",
-        failure=Failure(place=(x, y), wall=wall_nearest_to(geometry.maze, (x, y)), joints=stuck.joints),
+        failure=Failure(place=(x, y), wall=wall_nearest_to(query.maze, (x, y)), joints=stuck.joints),
         timings=_timings(geometry, begin),
     )
 

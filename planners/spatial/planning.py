@@ -139,7 +139,7 @@ def _warm(result: SpatialResult | None) -> tuple[np.ndarray, float] | None:
 
 def _answer(name: str, query: SpatialQuery, checker: Checker[SpatialMotion]) -> SpatialResult:
     """Ask a planner, and the checker about its motion."""
-    motion = None
+    checker.asked = None
     try:
         candidate = PLANNERS[name](query)
         if candidate.motion is None:
@@ -157,7 +157,9 @@ def _answer(name: str, query: SpatialQuery, checker: Checker[SpatialMotion]) -> 
             status=PlanningStatus.OUT_OF_TIME,
             planner=name,
             reason="Time was over before the exact check of a motion was.",
-            failure=None if motion is None else Failure(place=tuple(motion.joints[-1, -1].tolist())),
+            failure=None
+            if checker.asked is None
+            else Failure(place=tuple(checker.asked.joints[-1, -1].tolist())),
         )
     if report.valid:
         return SpatialResult(
