@@ -27,6 +27,9 @@ MOST_POSES_PER_LINK = 2000
 CHUNK = 1_000_000
 """Joints that are placed at a time, at most: some hundredths of a second, between which time is looked at."""
 
+ROOM = 100_000_000
+"""Joints for which there is room at first, at most: of a long arm all that might be is more than fits."""
+
 LATE = 4
 """How feeding ends where time is over; beside those of `planners.kernels.feeding`."""
 
@@ -97,8 +100,9 @@ def feed(
     n_links = kernel.links_at_end(track, arc, link_length)
     if n_links < 0:
         n_links = math.floor(arc[-1] / link_length) + 2
-    room, most = POSES_PER_LINK * n_links, MOST_POSES_PER_LINK * n_links
+    most = MOST_POSES_PER_LINK * n_links
     chunk = max(1, CHUNK // (n_links + 1))
+    room = min(POSES_PER_LINK * n_links, ROOM // (n_links + 1) + 1)
     poses = np.empty((room, n_links + 1, track.shape[1]))
     state, segments = np.zeros(5), np.zeros((2, n_links + 1), dtype=np.int64)
     places, n, ending = np.zeros((2, n_links + 1)), 0, kernel.FULL
@@ -107,8 +111,10 @@ def feed(
             ending = LATE
             break
         if n == room:
-            room = min(4 * room, most)
-            poses = np.concatenate([poses, np.empty((room - n, *poses.shape[1:]))])
+            room = min(2 * room, most)
+            more = np.empty((room, *poses.shape[1:]))
+            more[:n] = poses
+            poses = more
         n, ending = kernel.feed_along(
             track, arc, link_length, base_pose, step * link_length, sweep, poses, min(n + chunk, room),
             state, segments, places,

@@ -111,7 +111,7 @@ class Scene:
 
 def _without_repeated(ring: FloatArray) -> FloatArray:
     sizes = np.hypot(*(np.roll(ring, -1, axis=0) - ring).T)
-    return ring[sizes > SHORTEST_WALL]
+    return np.asarray(ring[sizes > SHORTEST_WALL])
 
 
 def _outward(ring: FloatArray) -> tuple[FloatArray, FloatArray]:

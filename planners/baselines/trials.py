@@ -93,7 +93,7 @@ def best_of(query: Query, geometry: Geometry, trials: Iterable[Trial]) -> Candid
     -------
     candidate : Candidate
         Where no motion is valid, the one that gets least deep into the walls; where there is no motion at
-        all, a dead end with the reason and the place of the first variant.
+        all, a dead end with the reason and the place of the first variant; out of time if not all were tried.
     """
     begin, best, depth, stuck, late = time.perf_counter(), None, np.inf, None, False
     maze = geometry.maze
