@@ -267,6 +267,4 @@ def motion_of(track: Track, length: float, maze: Maze, deadline: float = math.in
         feed[part], turns = configuration_from_joints(joints[part], length, maze.base_pose)
         angles[part] = np.unwrap(np.concatenate([before, turns]), axis=0)[1:]
         before = angles[part][-1:]
-    return Motion(
-        joints=joints, joint_angles=angles, feed=feed, link_length=length, base_pose=maze.base_pose
-    )
+    return Motion(joints=joints, joint_angles=angles, feed=feed, link_length=length, base_pose=maze.base_pose)

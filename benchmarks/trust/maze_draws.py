@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from shapely import affinity
-from shapely.geometry import LineString, Point, Polygon, box
+from shapely.geometry import LineString, MultiPolygon, Point, Polygon, box
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
@@ -143,7 +143,7 @@ def with_far_part(maze: Maze, draws) -> Maze:
     _, _, x_max, y_max = maze.free_space.bounds
     x, y = x_max + draws.uniform(0.1, 3.0) * maze.size, y_max
     part = box(x, y, x + draws.uniform(0.05, 1.0) * maze.size, y + 0.3 * maze.size)
-    return dataclasses.replace(maze, free_space=shapely.union_all([maze.free_space, part]))
+    return dataclasses.replace(maze, free_space=MultiPolygon([maze.free_space, part]))
 
 
 def _arm(draws, maze: Maze) -> ArmSpec:
@@ -206,9 +206,7 @@ def _slanted(draws) -> Maze:
     """Draw a hall or a corridor and press it aslant: no right angles, thin slivers."""
     maze = _hall(draws) if draws.integers(0, 2) else _corridor(draws)
     shear, press = draws.uniform(-50.0, 50.0), draws.uniform(0.3, 1.0)
-    space = affinity.scale(
-        affinity.skew(maze.free_space, xs=shear, origin=(0, 0)), 1.0, press, origin=(0, 0)
-    )
+    space = affinity.scale(affinity.skew(maze.free_space, xs=shear, origin=(0, 0)), 1.0, press, origin=(0, 0))
     base, goal = (
         np.array([x + y * math.tan(math.radians(shear)), press * y])
         for x, y in (maze.base_pose[:2], maze.goal)

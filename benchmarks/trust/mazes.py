@@ -77,9 +77,7 @@ def one_case(seed: int, number: int, tally: Tally, folder: Path) -> None:
         tally.check(number, "time", on_time, seconds)
         tally.check(number, "reason", laws.says_why, case, planner, result)
         if result.motion is not None:
-            tally.check(
-                number, "saved", laws.valid_when_saved, case, result.motion, folder / f"{number}.npz"
-            )
+            tally.check(number, "saved", laws.valid_when_saved, case, result.motion, folder / f"{number}.npz")
             (folder / f"{number}.npz").unlink(missing_ok=True)
         if planner == "auto":
             solved = result
@@ -139,7 +137,9 @@ def report(seed: int, done: int, tally: Tally, seconds: float) -> int:
     for law, meaning in laws.LAWS.items():
         print(f"{law}: {meaning}: {tally.cases[law]} cases, {by_law[law]} faults")
     print(f"outcomes: {dict(sorted(tally.statuses.items()))}")
-    print(f"seconds per plan: median {np.median(late):.2f}, 99 % {np.quantile(late, 0.99):.2f}, most {late.max():.2f}")
+    print(
+        f"seconds per plan: median {np.median(late):.2f}, 99 % {np.quantile(late, 0.99):.2f}, most {late.max():.2f}"
+    )
     print(f"{done} mazes with seed {seed} in {seconds:.0f} s, {len(tally.faults)} faults")
     (RESULTS / "mazes.json").write_text(
         json.dumps(
