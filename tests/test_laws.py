@@ -1,4 +1,4 @@
-"""Laws that hold of every maze, arm and motion; `python -m benchmarks.trust.mazes` checks them on thousands."""
+"""Laws of every maze, arm and motion; `python -m benchmarks.trust.mazes` checks them on thousands."""
 
 import dataclasses
 import time
