@@ -96,7 +96,7 @@ class Similarity:
 
 
 def draw_similarity(draws) -> Similarity:
-    """Draw a similarity: any direction, a scale of 1e-3 to 1e6, a shift of some maze sizes, maybe mirrored."""
+    """Draw a similarity: any direction, a scale of 1e-3 to 1e6, a shift of some maze sizes, or a mirror."""
     scale = 10.0 ** draws.uniform(-3.0, 6.0)
     return Similarity(
         scale=scale,
