@@ -211,9 +211,7 @@ def _mark_crossings(
 
 
 @njit(cache=True)
-def sweep_chords(
-    track: FloatArray, arc: FloatArray, length: float, walls: FloatArray
-) -> tuple[bool, Found]:
+def sweep_chords(track: FloatArray, arc: FloatArray, length: float, walls: FloatArray) -> tuple[bool, Found]:
     """Find what the chords of a track may meet; False if those that end at its points do meet walls.
 
     Parameters
