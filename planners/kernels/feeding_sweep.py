@@ -140,7 +140,7 @@ def _middle_chords(
     """
     along, squared, n_segments = directions(track, arc), length * length, arc.shape[0] - 1
     first = 0
-    while first < n_segments and arc[first + 1] <= length * (1.0 + 1e-12):
+    while first + 1 < n_segments and arc[first + 1] <= length * (1.0 + 1e-12):
         first += 1
     low[:], high[:] = 0.0, 0.0
     k, from_place, begin = 0, 0.0, length
@@ -211,7 +211,9 @@ def _mark_crossings(
 
 
 @njit(cache=True)
-def sweep_chords(track: FloatArray, arc: FloatArray, length: float, walls: FloatArray) -> tuple[bool, Found]:
+def sweep_chords(
+    track: FloatArray, arc: FloatArray, length: float, walls: FloatArray
+) -> tuple[bool, Found]:
     """Find what the chords of a track may meet; False if those that end at its points do meet walls.
 
     Parameters
@@ -228,8 +230,8 @@ def sweep_chords(track: FloatArray, arc: FloatArray, length: float, walls: Float
     free : bool
         Whether the chords that end at points of the track meet no wall.
     found : tuple
-        The fields of `Sweep`. Python's code would make a named tuple, Ctrl-C may arrive there, and numba
-        crashes then.
+        The fields of `Sweep`; a named tuple would be made by Python's code, in which Ctrl-C may arrive, and
+        numba crashes then.
 
     Notes
     -----
@@ -243,8 +245,6 @@ def sweep_chords(track: FloatArray, arc: FloatArray, length: float, walls: Float
     places, members = np.zeros(n + 1, dtype=np.int64), np.empty(4 * n + 16, dtype=np.int64)
     first = _middle_chords(track, arc, length, middle, low, high, ends)
     found = (walls, low, high, places, members, crosses)
-    if n == 0:
-        return True, found
     begin, n_members = first - 1, 0
     middle[begin, 0], middle[begin, 1], middle[begin, 4] = track[0, 0], track[0, 1], 1e-8 * length
     middle[begin, 2], middle[begin, 3] = track[first, 0], track[first, 1]
