@@ -29,6 +29,8 @@ class Checker(Generic[AnyMotion]):
 
     Attributes
     ----------
+    asked : motion or None
+        The last one it was asked about, whether or not there was time to answer.
     refused : list
         The motions that were not valid.
     seconds : float
@@ -43,6 +45,7 @@ class Checker(Generic[AnyMotion]):
     ) -> None:
         self.validate, self.deadline, self.progress = validate, deadline, progress
         self.last: tuple[AnyMotion, ValidationReport] | None = None
+        self.asked: AnyMotion | None = None
         self.refused: list[AnyMotion] = []
         self.seconds = 0.0
 
@@ -56,6 +59,7 @@ class Checker(Generic[AnyMotion]):
         """
         if self.last is not None and self.last[0] is motion:
             return self.last[1]
+        self.asked = motion
         start = time.perf_counter()
         try:
             report = self.validate(motion, self._tell)

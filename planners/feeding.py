@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,7 @@ from planners.kernels.feeding_sweep import Sweep, sweep_chords
 from planners.kernels.types import FloatArray
 from planners.problem import Motion
 
-__all__ = ["STEP", "Feeding", "feed", "motion_along", "motion_of"]
+__all__ = ["LATE", "STEP", "Feeding", "feed", "motion_along", "motion_of"]
 
 STEP = 0.03
 """Largest movement of a joint between poses, in link lengths."""
@@ -22,6 +23,15 @@ POSES_PER_LINK = 120
 
 MOST_POSES_PER_LINK = 2000
 """Largest number of poses per link length of track; a joint that needs more is about to jump."""
+
+CHUNK = 1_000_000
+"""Joints that are placed at a time, at most: some hundredths of a second, between which time is looked at."""
+
+ROOM = 100_000_000
+"""Joints for which there is room at first, at most: of a long arm all that might be is more than fits."""
+
+LATE = 4
+"""How feeding ends where time is over; beside those of `planners.kernels.feeding`."""
 
 
 UNCHECKED = Sweep(
@@ -44,7 +54,7 @@ class Feeding:
     poses : array, shape (n_poses, n_links + 1, 2 or 3)
         As far as it went; the tip last.
     ending : int
-        One of DONE, JUMP, FULL and MEETS of `planners.kernels.feeding`.
+        One of DONE, JUMP, FULL and MEETS of `planners.kernels.feeding`, or LATE.
     place : tuple of two or three floats
         Where the tip was at the end, in maze units.
     """
@@ -60,6 +70,7 @@ def feed(
     base_pose: FloatArray,
     step: float = STEP,
     walls: FloatArray | None = None,
+    deadline: float = math.inf,
 ) -> Feeding:
     """Feed an arm along a track, in the plane or in space.
 
@@ -76,6 +87,8 @@ def feed(
     walls : array, shape (n_walls, 2, 2), or None
         Segments, in maze units, in the plane alone; if given, feeding ends at the first pose that meets one
         of them or itself. That is before the first pose if chords that end at points of the track do.
+    deadline : float
+        When to stop, on the clock of `time.perf_counter`.
     """
     # About the base: far from the origin, rounding would be more than links are exact to.
     base, heading = kernel.feeder_axis(base_pose)
@@ -91,13 +104,25 @@ def feed(
     n_links = kernel.links_at_end(track, arc, link_length)
     if n_links < 0:
         n_links = math.floor(arc[-1] / link_length) + 2
-    room = POSES_PER_LINK * n_links
-    while True:
-        poses = np.empty((room, n_links + 1, track.shape[1]))
-        n, ending = kernel.feed_along(track, arc, link_length, centred, step * link_length, sweep, poses)
-        if ending != kernel.FULL or room >= MOST_POSES_PER_LINK * n_links:
+    most = MOST_POSES_PER_LINK * n_links
+    chunk = max(1, CHUNK // (n_links + 1))
+    room = min(POSES_PER_LINK * n_links, ROOM // (n_links + 1) + 1)
+    poses = np.empty((room, n_links + 1, track.shape[1]))
+    state, segments = np.zeros(5), np.zeros((2, n_links + 1), dtype=np.int64)
+    places, n, ending = np.zeros((2, n_links + 1)), 0, kernel.FULL
+    while ending == kernel.FULL and n < most:
+        if n > 0 and time.perf_counter() >= deadline:
+            ending = LATE
             break
-        room = min(4 * room, MOST_POSES_PER_LINK * n_links)
+        if n == room:
+            room = min(2 * room, most)
+            more = np.empty((room, *poses.shape[1:]))
+            more[:n] = poses
+            poses = more
+        n, ending = kernel.feed_along(
+            track, arc, link_length, centred, step * link_length, sweep, poses, min(n + chunk, room),
+            state, segments, places,
+        )  # fmt: skip
     poses = poses[:n]
     # Links that never leave the feeder are not needed: those behind the base at the end.
     along = poses[-1] @ heading

@@ -234,7 +234,7 @@ def _depth(result: PlanningResult) -> float:
 def _answer(question: Question, checker: Checker[Motion]) -> PlanningResult:
     """Ask one planner, and the checker about its motion."""
     name, _, query = question
-    checker.seconds, motion = 0.0, None
+    checker.seconds, checker.asked = 0.0, None
     try:
         candidate = PLANNERS[name](query)
         if candidate.motion is None:
@@ -252,7 +252,7 @@ def _answer(question: Question, checker: Checker[Motion]) -> PlanningResult:
             status=PlanningStatus.OUT_OF_TIME,
             planner=name,
             reason="Time was over before the exact check of a motion was.",
-            failure=None if motion is None else Failure(place=_end_of(motion)),
+            failure=None if checker.asked is None else Failure(place=_end_of(checker.asked)),
         )
     timings = {**candidate.timings, "validate": checker.seconds}
     if report.valid:

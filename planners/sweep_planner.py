@@ -127,6 +127,8 @@ class _Search:
             if track.reached:
                 if self._accepts(track):
                     return self.motion
+                if self.motion is None:
+                    break
                 crossing = self._fault().kind == "crossing"
                 if strict or crossing:
                     others = self._other_ways(track, chosen, self._nearest_index(self._fault()))
@@ -211,10 +213,16 @@ class _Search:
         return track
 
     def _accepts(self, track: Track) -> bool:
-        """Make the motion of a track and ask the checker about it; without a checker, accept it."""
+        """Make the motion of a track and ask the checker about it; without a checker, accept it.
+
+        If there is no time to make it, there is no motion then.
+        """
         clock = time.perf_counter()
-        self.motion = motion_of(track, self.query.arm.link_length, self.query.maze)
+        query = self.query
+        self.motion = motion_of(track, query.arm.link_length, query.maze, query.deadline)
         self.seconds["poses"] += time.perf_counter() - clock
+        if self.motion is None:
+            return False
         self.report = self.query.check(self.motion)
         return self.report is None or self.report.valid
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrsnake_env.arm import ArmSpec
+from hrsnake_env.arm import ArmSpec, configuration_from_joints
 from hrsnake_env.maze import Maze
 from planners.corners import Corner
 from planners.kernels import sweep as kernel
@@ -43,6 +43,9 @@ SEARCH_REACH = 0.5
 
 CHUNK = 20_000
 """Vertices between two looks at the clock."""
+
+POSED = 200_000
+"""Links that are posed between two looks at the clock."""
 
 
 class Fineness(NamedTuple):
@@ -243,14 +246,25 @@ def _common(track: Track, earlier: Track, s: FloatArray, length: float) -> int:
     return n
 
 
-def motion_of(track: Track, length: float, maze: Maze) -> Motion:
-    """Make poses of a track, thinned to the largest step of its fineness."""
+def motion_of(track: Track, length: float, maze: Maze, deadline: float = math.inf) -> Motion | None:
+    """Make poses of a track, thinned to the largest step of its fineness; None if time is over before."""
     per_link, step = track.fineness.per_link, track.fineness.step * length
     kept = np.empty(track.n, dtype=np.int64)
     most = 8.0 * track.fineness.deviation
     n_kept = kernel.thin_track(track.n, track.points, track.start, track.headings, per_link, step, most, kept)
     kept = kept[:n_kept]
     n_links = max(1, kernel.chain_length(int(kept[-1]), track.start, per_link))
-    joints = np.empty((n_kept, n_links + 1, 2))
-    kernel.pose_joints(kept, track.points, track.start, per_link, length, maze.base_pose, joints)
-    return Motion.from_joints(joints, length, maze.base_pose)
+    joints, feed = np.empty((n_kept, n_links + 1, 2)), np.empty(n_kept)
+    angles, before = np.empty((n_kept, n_links)), np.zeros((1, n_links))
+    rows = max(1, POSED // n_links)
+    for first in range(0, n_kept, rows):
+        if first > 0 and time.perf_counter() >= deadline:
+            return None
+        part = slice(first, first + rows)
+        kernel.pose_joints(
+            kept[part], track.points, track.start, per_link, length, maze.base_pose, joints[part]
+        )
+        feed[part], turns = configuration_from_joints(joints[part], length, maze.base_pose)
+        angles[part] = np.unwrap(np.concatenate([before, turns]), axis=0)[1:]
+        before = angles[part][-1:]
+    return Motion(joints=joints, joint_angles=angles, feed=feed, link_length=length, base_pose=maze.base_pose)

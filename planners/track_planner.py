@@ -384,7 +384,7 @@ def _finished(track: _Track, scene: Scene, query: Query) -> _Track:
         aside, weights = (per_link, margin) == ASIDE, replace(FINE_WEIGHTS, margin=margin)
         settled = _settled(track, per_link, scene, weights, query, ASIDE_STEPS if aside else MOST_STEPS)
         if settled.lacking[kernel.CORNER, 0] <= 0.0 and not (settled.slips or query.late):
-            poses = _free_poses(settled, scene)
+            poses = _free_poses(settled, scene, query.deadline)
             if poses is not None:
                 return replace(settled, poses=poses)
         if not aside:
@@ -406,10 +406,11 @@ def _settled(
     return track
 
 
-def _free_poses(track: _Track, scene: Scene) -> FloatArray | None:
-    """Return the poses along a track if the arm fits it exactly."""
+def _free_poses(track: _Track, scene: Scene, deadline: float) -> FloatArray | None:
+    """Return the poses along a track if the arm fits it exactly and there is time to make them."""
     maze = scene.maze
-    fed = feed(scene.unscaled(track.points), scene.length, maze.base_pose, walls=maze.walls)
+    line = scene.unscaled(track.points)
+    fed = feed(line, scene.length, maze.base_pose, walls=maze.walls, deadline=deadline)
     return fed.poses if fed.ending == feeding_kernel.DONE else None
 
 
@@ -443,7 +444,7 @@ def _unsolved(track: _Track, scene: Scene, query: Query, timings: Mapping[str, f
         status=PlanningStatus.OUT_OF_TIME if query.late else PlanningStatus.DEAD_END,
         reason=f"The joint track is not free near ({x:.1f}, {y:.1f}) {scene.maze.units}{late}: {why}.",
         failure=Failure(
-            place=(x, y), path_position=path_position, depth=depth, wall=wall_nearest_to(scene.maze, (x, y))
+            place=(x, y), path_position=path_position, depth=depth, wall=wall_nearest_to(query.maze, (x, y))
         ),
         timings=timings,
     )

@@ -18,6 +18,9 @@ __all__ = ["Scene"]
 CELL = 0.25
 """Size of the grid cells by which walls are listed, in link lengths."""
 
+SHORTEST_WALL = 1e-12
+"""Walls up to this length are left out, in link lengths."""
+
 MOST_CELLS = 400
 """Grid cells along one side, at most."""
 
@@ -65,8 +68,11 @@ class Scene:
 
     @cached_property
     def rings(self) -> list[FloatArray]:
-        """The walls as rings, each of shape (n_vertices, 2), with the free space on the left."""
-        return [self.scaled(ring[:-1]) for ring in self.maze.rings]
+        """The walls as rings, each of shape (n_vertices, 2), with the free space on the left.
+
+        Without walls so short that they have no direction, which are left where outlines are united.
+        """
+        return [_without_repeated(self.scaled(ring[:-1])) for ring in self.maze.rings]
 
     @cached_property
     def outward(self) -> list[FloatArray]:
@@ -76,7 +82,7 @@ class Scene:
     @cached_property
     def near(self) -> Surroundings:
         """Walls and corners, for the kernels."""
-        walls = self.scaled(self.maze.walls)
+        walls = np.concatenate([np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in self.rings])
         convex = np.concatenate([_outward(ring)[0] for ring in self.rings])
         origin = walls.min(axis=(0, 1)) - 1.0
         size = walls.max(axis=(0, 1)) + 1.0 - origin
@@ -101,6 +107,11 @@ class Scene:
     def sees(self, a: FloatArray, b: FloatArray) -> bool:
         """Tell whether no wall meets the segment between two points, in link lengths."""
         return bool(kernel.wall_between(a[0], a[1], b[0], b[1], self.near.walls) < 0)
+
+
+def _without_repeated(ring: FloatArray) -> FloatArray:
+    sizes = np.hypot(*(np.roll(ring, -1, axis=0) - ring).T)
+    return np.asarray(ring[sizes > SHORTEST_WALL])
 
 
 def _outward(ring: FloatArray) -> tuple[FloatArray, FloatArray]:

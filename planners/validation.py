@@ -113,8 +113,11 @@ def validate(
     motion.check_maze(maze)
     tell = progress if progress is not None else lambda stage, share: None
     scene = Scene(motion=motion, maze=maze, radius=arm.link_radius)
+    tell("validate", 0.0)  # a progress that raises ends the check: it is told between what takes long
     length_error, length = check_lengths(scene)
+    tell("validate", 0.0)
     largest_step, step = check_steps(scene)
+    tell("validate", 0.0)
     goal_distance, goal = check_goal(scene)
     sifted = sift(scene, tell)
     clearance, penetration, deep = check_poses(scene, sifted.doubtful(scene), tell)

@@ -197,7 +197,7 @@ def test_after_the_deadline_no_more_variants_are_tried():
     query = dataclasses.replace(asked("fig19", 430.0), deadline=time.perf_counter())
     joints = np.array([(0.0, 5.0), (0.0, 435.0)])
     trials = iter([Stuck(why="a joint would jump", joints=joints)] * 3)
-    assert best_of(query, query.geometry, trials).status is PlanningStatus.DEAD_END
+    assert best_of(query, query.geometry, trials).status is PlanningStatus.OUT_OF_TIME
     assert len(list(trials)) == 2
     assert best_of(query, query.geometry, []).status is PlanningStatus.OUT_OF_TIME
     assert PLANNERS["backbone"](query).status is PlanningStatus.OUT_OF_TIME

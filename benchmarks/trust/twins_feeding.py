@@ -124,7 +124,11 @@ def feed_along_agrees(rng):
     n_links = feeding.links_at_end(track, arc, length)
     room = math.ceil(arc[-1] / length) + 1 if n_links < 0 else n_links
     poses = np.empty((4000, room + 1, track.shape[1]))
-    n, ending = feeding.feed_along(track, arc, length, base_pose, step, UNCHECKED, poses)
+    state, segments = np.zeros(5), np.zeros((2, room + 1), dtype=np.int64)
+    places = np.zeros((2, room + 1))
+    n, ending = feeding.feed_along(
+        track, arc, length, base_pose, step, UNCHECKED, poses, len(poses), state, segments, places
+    )
     assert ending in (feeding.DONE, feeding.JUMP)
     base, heading = feeding.feeder_axis(base_pose)
     poses = poses[:n]

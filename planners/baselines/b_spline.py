@@ -68,7 +68,7 @@ def _trials(query: Query, geometry: Geometry) -> Iterator[Trial]:
             curves[deviation] = b_spline(geometry.path, deviation)
         line = beside(curves[deviation], length, shift)
         track = followed_track(line, length, maze.base_pose, maze.goal, STOP * maze.goal_radius)
-        yield fed_along(track, length, maze.base_pose)
+        yield fed_along(track, length, maze.base_pose, query.deadline)
 
 
 def b_spline(path: Path, deviation: float) -> FloatArray:

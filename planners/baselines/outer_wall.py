@@ -72,7 +72,7 @@ def _trials(query: Query, geometry: Geometry) -> Iterator[Trial]:
         query.tell("plan", number / len(variants))
         line = outer_line(geometry, length, share, held, longest)
         track = followed_track(line, length, maze.base_pose, maze.goal, STOP * maze.goal_radius)
-        yield fed_along(track, length, maze.base_pose)
+        yield fed_along(track, length, maze.base_pose, query.deadline)
 
 
 def outer_line(

@@ -13,7 +13,7 @@ import time
 
 import numpy as np
 
-from planners.feeding import Feeding, feed, motion_of
+from planners.feeding import LATE, Feeding, feed, motion_of
 from planners.kernels import feeding as kernel
 from planners.kernels.types import FloatArray
 from planners.problem import Candidate, Failure, PlanningStatus
@@ -41,8 +41,7 @@ def plan_path_following(query: Query) -> Candidate:
     Parameters
     ----------
     query : Query
-        Maze, arm and terms; neither joint limits nor a warm start are used, and one run takes milliseconds,
-        so no deadline either.
+        Maze, arm and terms; neither joint limits nor a warm start are used.
 
     Returns
     -------
@@ -57,7 +56,7 @@ def plan_path_following(query: Query) -> Candidate:
     clock = [time.perf_counter()]
     maze = geometry.maze
     track = followed_track(geometry.path.points, length, maze.base_pose, maze.goal, STOP * maze.goal_radius)
-    fed = feed(track, length, maze.base_pose)
+    fed = feed(track, length, maze.base_pose, deadline=query.deadline)
     clock.append(time.perf_counter())
     query.tell("plan", 1.0)
     stuck = _stuck(fed, maze.base_pose, length)
@@ -65,7 +64,7 @@ def plan_path_following(query: Query) -> Candidate:
         why, pose = stuck
         x, y = (float(value) for value in fed.poses[pose, -1])
         return Candidate(
-            status=PlanningStatus.DEAD_END,
+            status=PlanningStatus.OUT_OF_TIME if fed.ending == LATE else PlanningStatus.DEAD_END,
             reason=f"With the tip at ({x:.1f}, {y:.1f}) {maze.units}, {why}.",
             failure=Failure(place=(x, y), joints=fed.poses[pose]),
             timings={**geometry.timings, "plan": clock[1] - clock[0]},
@@ -78,6 +77,8 @@ def plan_path_following(query: Query) -> Candidate:
 
 def _stuck(fed: Feeding, base_pose: FloatArray, link_length: float) -> tuple[str, int] | None:
     """Say why an arm cannot advance along the whole path, and from which pose on; None if it can."""
+    if fed.ending == LATE:
+        return "time was over", -1
     heading = np.array([math.cos(base_pose[2]), math.sin(base_pose[2])])
     # Links that end in the feeder are left out: if they were out of it before, they come back over the axis.
     forward = np.diff(fed.poses[:, 0] @ heading)

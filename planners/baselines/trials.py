@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ import numpy as np
 import shapely
 
 from hrsnake_env.maze import Maze
-from planners.feeding import feed, motion_of
+from planners.feeding import LATE, feed, motion_of
 from planners.kernels import feeding as kernel
 from planners.kernels.types import FloatArray
 from planners.obstruction import wall_nearest_to
@@ -24,6 +25,7 @@ POSES, PLACES = 300, 9
 """Poses, and places on each link, at which a motion's depth in the walls is looked at: enough to rank."""
 
 BACK = "the arm behind it would have to go back into the feeder for it to advance"
+OVER = "time was over"
 JUMP = "a joint behind it would have to jump along the track to stay a link length behind"
 
 
@@ -47,7 +49,9 @@ Trial = Motion | Stuck
 """What comes of one variant of a method."""
 
 
-def fed_along(track: FloatArray, link_length: float, base_pose: FloatArray) -> Trial:
+def fed_along(
+    track: FloatArray, link_length: float, base_pose: FloatArray, deadline: float = math.inf
+) -> Trial:
     """Feed an arm along a track (`planners.feeding.feed`), whatever walls it meets.
 
     Parameters
@@ -58,8 +62,12 @@ def fed_along(track: FloatArray, link_length: float, base_pose: FloatArray) -> T
         In maze units.
     base_pose : array, shape (3,)
         Base position and heading.
+    deadline : float
+        When to stop, on the clock of `time.perf_counter`.
     """
-    fed = feed(track, link_length, base_pose)
+    fed = feed(track, link_length, base_pose, deadline=deadline)
+    if fed.ending == LATE:
+        return Stuck(why=OVER, joints=fed.poses[-1])
     if fed.ending != kernel.DONE:
         return Stuck(why=JUMP, joints=fed.poses[-1])
     # Links behind the base at the end have been left out: were they out of the feeder before?
@@ -85,9 +93,9 @@ def best_of(query: Query, geometry: Geometry, trials: Iterable[Trial]) -> Candid
     -------
     candidate : Candidate
         Where no motion is valid, the one that gets least deep into the walls; where there is no motion at
-        all, a dead end with the reason and the place of the first variant.
+        all, a dead end with the reason and the place of the first variant; out of time if not all were tried.
     """
-    begin, best, depth, stuck = time.perf_counter(), None, np.inf, None
+    begin, best, depth, stuck, late = time.perf_counter(), None, np.inf, None, False
     maze = geometry.maze
     for trial in trials:
         if isinstance(trial, Stuck):
@@ -101,9 +109,10 @@ def best_of(query: Query, geometry: Geometry, trials: Iterable[Trial]) -> Candid
             if best is None or how_deep < depth:
                 best, depth = trial, how_deep
         if query.late:
+            late = True
             break
     if best is None and stuck is not None:
-        return _dead_end(geometry, begin, stuck)
+        return _dead_end(query, geometry, begin, stuck, late)
     return _answer(geometry, begin, best)
 
 
@@ -119,12 +128,13 @@ def _answer(geometry: Geometry, begin: float, motion: Motion | None) -> Candidat
     return Candidate(status=PlanningStatus.SOLVED, motion=motion, timings=_timings(geometry, begin))
 
 
-def _dead_end(geometry: Geometry, begin: float, stuck: Stuck) -> Candidate:
+def _dead_end(query: Query, geometry: Geometry, begin: float, stuck: Stuck, late: bool) -> Candidate:
+    before = "Time was over before everything was tried. " if late else ""
     x, y = (float(value) for value in stuck.joints[-1])
     return Candidate(
-        status=PlanningStatus.DEAD_END,
-        reason=f"With the tip at ({x:.1f}, {y:.1f}) {geometry.maze.units}, {stuck.why}.",
-        failure=Failure(place=(x, y), wall=wall_nearest_to(geometry.maze, (x, y)), joints=stuck.joints),
+        status=PlanningStatus.OUT_OF_TIME if late else PlanningStatus.DEAD_END,
+        reason=f"{before}With the tip at ({x:.1f}, {y:.1f}) {geometry.maze.units}, {stuck.why}.",
+        failure=Failure(place=(x, y), wall=wall_nearest_to(query.maze, (x, y)), joints=stuck.joints),
         timings=_timings(geometry, begin),
     )
 

@@ -143,9 +143,11 @@ def _releases(track: FloatArray, along: FloatArray, arc: FloatArray, length: flo
 @njit(cache=True)
 def feed_along(
     track: FloatArray, arc: FloatArray, length: float, base_pose: FloatArray, step: float, sweep: Sweep,
-    poses: FloatArray,
+    poses: FloatArray, most: int, state: FloatArray, segments: IntArray, places: FloatArray,
 ) -> tuple[int, int]:  # fmt: skip
     """Feed an arm along a track, pose by pose; no joint moves farther than `step` between two.
+
+    It may be called again to go on from where it was full.
 
     Parameters
     ----------
@@ -161,6 +163,13 @@ def feed_along(
         What chords of the track may meet; with empty arrays, as always in space, nothing is looked at.
     poses : array, shape (n_max, n_joints, 2 or 3)
         Filled with the joints of each pose, the tip last.
+    most : int
+        Poses, after which it is full; at most `n_max`.
+    state : array, shape (5,)
+        Zeros at first. How far it is: number of poses, place of the tip, stride, number of the joint that is
+        placed last, and which half of the next two arrays is in use.
+    segments, places : array, shape (2, n_joints)
+        Zeros at first. Segment and arclength of the joints, from the tip on, before and after a step.
 
     Returns
     -------
@@ -174,16 +183,18 @@ def feed_along(
     """
     n_joints, end = poses.shape[1], poses.shape[1] - 1
     base, heading = feeder_axis(base_pose)
-    segments, places = np.zeros((2, n_joints), dtype=np.int64), np.zeros((2, n_joints))
     along = directions(track, arc)
     releases, next_release = _releases(track, along, arc, length), 0
     total, checked = arc[arc.shape[0] - 1], sweep.low.shape[0] > 0
     links = np.empty(n_joints, dtype=np.int64)
-    _put_behind(0, 0.0, length, base, heading, poses[0])
-    placed, tip, stride, n_poses, old = 0, 0.0, step, 1, 0
+    if state[0] == 0.0:
+        _put_behind(0, 0.0, length, base, heading, poses[0])
+        state[0], state[2] = 1.0, step
+    n_poses, tip, stride, placed, old = int(state[0]), state[1], state[2], int(state[3]), int(state[4])
     while tip < total:
         now = poses[n_poses - 1]
-        if n_poses == poses.shape[0]:
+        if n_poses >= most:
+            state[0], state[1], state[2], state[3], state[4] = n_poses, tip, stride, placed, old
             return n_poses, FULL
         new, segment, place = poses[n_poses], segments[old], places[old]
         new_segment, new_place = segments[1 - old], places[1 - old]

@@ -165,7 +165,7 @@ def _warm(
 
 def _answer(name: str, query: SpatialQuery, checker: Checker[SpatialMotion]) -> SpatialResult:
     """Ask a planner, and the checker about its motion."""
-    motion = None
+    checker.asked = None
     try:
         candidate = PLANNERS[name](query)
         if candidate.motion is None:
@@ -184,8 +184,8 @@ def _answer(name: str, query: SpatialQuery, checker: Checker[SpatialMotion]) -> 
             planner=name,
             reason="Time was over before the exact check of a motion was.",
             failure=None
-            if motion is None
-            else Failure(place=tuple((motion.joints[-1, -1] + query.origin).tolist())),
+            if checker.asked is None
+            else Failure(place=tuple((checker.asked.joints[-1, -1] + query.origin).tolist())),
         )
     motion, track = motion.moved(query.origin), _moved_track(candidate.track, query.origin)
     if report.valid:

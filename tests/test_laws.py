@@ -1,0 +1,170 @@
+"""Laws of every maze, arm and motion; `python -m benchmarks.trust.mazes` checks them on thousands."""
+
+import dataclasses
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely.geometry import Polygon, box
+from strategies import cases, similarities
+
+from benchmarks.trust import maze_laws as laws
+from benchmarks.trust.maze_draws import draw_case, with_far_part, with_far_walls
+from hrsnake_env.arm import ArmSpec
+from hrsnake_env.maze import Maze
+from hrsnake_env.mazes import fig19, serpentine
+from planners import PLANNERS, PlanningStatus, plan
+from planners.feeding import LATE, feed
+from planners.problem import Motion
+from planners.validation import validate
+
+FEW = settings(max_examples=8)
+BUDGET = 1.0
+SAMPLING = ("rrt-connect", "aorrtc")  # they want OMPL, which not every environment has
+
+
+@pytest.fixture(scope="module")
+def solved():
+    """Return random cases, each with the motion that was planned for it."""
+    found = []
+    for number in range(60):
+        case = draw_case(np.random.default_rng([1, number]))
+        result = plan(case.maze, case.arm, time_budget=BUDGET, explain=False)
+        if result.motion is not None and result.motion.n_poses < 1500:
+            found.append((case, result))
+        if len(found) == 8:
+            return found
+    raise AssertionError("Expected more mazes that are easy.")
+
+
+SOLVED = st.integers(0, 7)
+
+
+@FEW
+@given(case=cases(), planner=st.sampled_from(["auto", *(name for name in PLANNERS if name not in SAMPLING)]))
+def test_any_planner_ends_with_a_valid_motion_or_a_reason_and_a_place(case, planner, tmp_path_factory):
+    result, _ = laws.timed_plan(case, planner, BUDGET)
+    laws.says_why(case, planner, result)
+    if result.motion is not None:
+        laws.valid_when_saved(case, result.motion, tmp_path_factory.mktemp("laws") / "motion.npz")
+
+
+@FEW
+@given(which=SOLVED, similarity=similarities())
+def test_a_motion_is_valid_in_a_maze_that_is_moved_with_it(solved, which, similarity):
+    case, result = solved[which]
+    laws.valid_when_moved(case, result.motion, similarity)
+
+
+@FEW
+@given(which=SOLVED, share=st.floats(0.0, 1.0))
+def test_a_motion_that_is_cut_lacks_nothing_but_the_goal(solved, which, share):
+    case, result = solved[which]
+    laws.valid_when_cut(case, result.motion, 1 + int(share * (result.motion.n_poses - 1)))
+
+
+def test_a_motion_backward_lacks_nothing_but_its_ends(solved):
+    for case, result in solved:
+        laws.valid_when_reversed(case, result.motion)
+
+
+def test_walls_that_no_arm_can_reach_leave_motions_valid(solved):
+    for number, (case, result) in enumerate(solved):
+        far = laws.replace_maze(case, with_far_walls(case.maze, np.random.default_rng(number)))
+        laws.stays_valid(result.motion, far.maze, far, "with far walls")
+
+
+def test_another_part_of_the_free_space_changes_no_digit_of_a_plan(solved):
+    for number, (case, result) in enumerate(solved[:3]):
+        far = laws.replace_maze(case, with_far_part(case.maze, np.random.default_rng(number)))
+        again, _ = laws.timed_plan(far, "auto", 30.0 * BUDGET)
+        np.testing.assert_array_equal(again.motion.joints, result.motion.joints)
+
+
+def test_a_planted_shift_of_one_joint_breaks_a_law(solved):
+    case, result = solved[0]
+    joints = result.motion.joints.copy()
+    joints[result.motion.n_poses // 2, -1] += 0.02 * case.arm.link_length
+    with pytest.raises(laws.Broken):
+        laws.stays_valid(dataclasses.replace(result.motion, joints=joints), case.maze, case, "shifted")
+
+
+@pytest.mark.parametrize("planner", ["auto", "track", "outer-wall"])
+def test_the_wall_in_the_way_of_thick_links_is_a_wall_of_the_maze(planner):
+    # Walls grown by the radius have more vertices, and so other numbers.
+    maze, arm = fig19(), ArmSpec(link_length=425.0, link_radius=40.0)
+    result = plan(maze, arm, planner, explain=False, time_budget=4.0)
+    assert not result.solved
+    wall = result.failure.wall
+    assert wall is None or wall < len(maze.walls)
+
+
+@pytest.mark.parametrize("size", [1e-13, 1e-14])
+def test_walls_without_length_stop_no_planner(size):
+    # Unions of outlines leave such walls where edges of both meet.
+    outline = np.array([(0, 0), (0, 900), (700, 900), (700, 700), (200, 700), (200, 0)], dtype=float)
+    doubled = np.insert(outline, 4, outline[3] - (0.0, size * 700.0), axis=0)
+    maze = dataclasses.replace(
+        Maze.from_corridors([(100, 0), (100, 800), (700, 800)], 200.0), free_space=Polygon(doubled)
+    )
+    for planner in ("track", "sweep", "beam", "follow"):
+        assert plan(maze, ArmSpec(link_length=250.0), planner, time_budget=4.0).reason is not None
+
+
+def test_feeding_goes_on_where_it_was_full(monkeypatch):
+    turn = np.linspace(0.0, 3.0, 300)
+    track = np.concatenate(
+        [[(0.0, 0.0)], np.column_stack([1.0 + 2.0 * np.sin(turn), 2.0 - 2.0 * np.cos(turn)])]
+    )
+    whole = feed(track, 1.0, np.zeros(3))
+    monkeypatch.setattr("planners.feeding.CHUNK", 7)
+    monkeypatch.setattr("planners.feeding.ROOM", 20)
+    pieces = feed(track, 1.0, np.zeros(3))
+    np.testing.assert_array_equal(pieces.poses, whole.poses)
+    late = feed(track, 1.0, np.zeros(3), deadline=time.perf_counter())
+    assert late.ending == LATE and len(late.poses) < len(whole.poses)
+
+
+@pytest.mark.parametrize("planner", ["track", "sweep", "follow"])
+def test_where_time_ends_while_poses_are_made_the_result_says_so(planner, monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr("planners.feeding.CHUNK", 1000)
+    monkeypatch.setattr("planners.sweep_track.POSED", 1000)
+
+    def clock():
+        now[0] += 0.1
+        return now[0]
+
+    case = laws.Case(kind="serpentine", maze=serpentine(4), arm=ArmSpec(link_length=100.0))
+    monkeypatch.setattr("planners.feeding.time.perf_counter", clock)
+    result = plan(case.maze, case.arm, planner, time_budget=2.0, explain=False)
+    assert result.status is PlanningStatus.OUT_OF_TIME
+    laws.says_why(case, planner, result)
+
+
+def test_time_that_ends_in_a_check_within_a_planner_has_a_place(monkeypatch):
+    from planners.checking import Checker, Late
+
+    def late(self, stage, share):
+        if stage == "validate":
+            raise Late
+
+    monkeypatch.setattr(Checker, "_tell", late)
+    result = plan(fig19(), ArmSpec(link_length=200.0), "backbone", explain=False)
+    assert result.status is PlanningStatus.OUT_OF_TIME and result.place is not None
+
+
+def test_a_check_tells_before_it_looks_at_the_first_pose():
+    told = []
+    motion = Motion.from_configurations([0.0, 0.04], np.zeros((2, 1)), 1.0, (0.0, 0.0, 0.0))
+    maze = Maze(
+        name="box",
+        free_space=box(-1.0, -1.0, 2.0, 1.0),
+        base_pose=np.zeros(3),
+        goal=np.array([1.0, 0.0]),
+        goal_radius=0.1,
+    )
+    validate(motion, maze, progress=lambda stage, share: told.append(share))
+    assert told[0] == 0.0 and told == sorted(told)
