@@ -239,6 +239,7 @@ def _between(found, walls, motion, cores):
     shape = feed.shape
     joints = place(feed.ravel(), angles.reshape(-1, n_links), length, walls.base).reshape(*shape, n_links + 1)
     past = feed[..., None] - (n_links - np.arange(n_links + 1)) * length
+    past = np.where(np.abs(past) < TIE * length, 0.0, past)  # a joint at the base by rounding is where it is
     _swept(found, walls, joints, past, turns, length, cores)
     _crossing(found, walls, joints, past, turns, push, length)
     if folded >= 0.0 or (found.faulty["crossing"] is False and folded > -1e-11):

@@ -80,7 +80,10 @@ def _deepest(scene: Scene, segments: FloatArray) -> Nearest:
     """
     outside = shapely.difference(shapely.linestrings(segments), scene.free)
     parts, owner = shapely.get_parts(outside, return_index=True)
-    parts, owner = parts[~shapely.is_empty(parts)], owner[~shapely.is_empty(parts)]
+    # Of a segment that lies on a wall to the last bit but one, pieces in the free space may be left, too.
+    middles = shapely.line_interpolate_point(parts, 0.5, normalized=True)
+    left = ~shapely.is_empty(parts) & ~shapely.intersects(scene.free, middles)
+    parts, owner = parts[left], owner[left]
     ends = np.stack([shapely.get_coordinates(shapely.get_point(parts, k)) for k in (0, -1)], axis=1)
     walls, accuracy = scene.maze.walls, 0.1 * ROUNDING * scene.length
     # What is not covered is outside, even where rounding leaves nothing of it.
