@@ -3,8 +3,11 @@ VENV := .venv
 BIN := $(VENV)/bin
 OLD := .venv-oldest
 INPUTS := pyproject.toml constraints.txt
+MINORS := 12 13
+CORE := tests/test_env.py tests/test_maze.py tests/test_planning.py tests/test_validation.py
+CAMPAIGNS := mazes agreement spatial_agreement kernel_twins degenerate fuzz_maps fuzz_files kills ctrl_c disk load
 
-.PHONY: demo test oldest notebooks docs docs-pictures kernels lint types contracts check format clean
+.PHONY: demo test oldest pythons audit trust notebooks docs docs-pictures kernels lint types contracts check format clean
 
 ## demo: plan, check and simulate the paper's benchmark; writes demo/
 demo: $(VENV)/.core
@@ -37,9 +40,31 @@ kernels: $(VENV)/.all
 		tests/test_track.py::test_feeding_keeps_lengths_steps_and_the_track \
 		tests/test_track.py::test_hits_and_self_crossings_are_those_of_shapely
 
-## oldest: the environment's tests with the oldest versions that pyproject.toml allows
+## oldest: the world's and the planners' tests with the oldest versions that pyproject.toml allows
 oldest: $(OLD)/.all
-	$(OLD)/bin/python -m pytest tests/test_env.py tests/test_workers.py
+	$(OLD)/bin/python -m pytest --numprocesses auto --dist worksteal $(CORE) tests/test_workers.py
+
+## pythons: the same with the newest versions and every other supported Python that is here
+pythons:
+	@for minor in $(MINORS); do \
+		python=$$(ls -d $${PYENV_ROOT:-$$HOME/.pyenv}/versions/3.$$minor.*/bin/python 2>/dev/null | tail -n 1); \
+		python3.$$minor --version >/dev/null 2>&1 && python=python3.$$minor; \
+		if [ -z "$$python" ]; then echo "Python 3.$$minor is not here: not tested."; continue; fi; \
+		echo "Python 3.$$minor:"; \
+		{ [ -x .venv-3.$$minor/bin/python ] || $$python -m venv .venv-3.$$minor; } \
+		&& .venv-3.$$minor/bin/python -m pip install --quiet --constraint constraints.txt --editable '.[play]' \
+			pytest pytest-xdist hypothesis \
+		&& .venv-3.$$minor/bin/python -m pytest --numprocesses auto --dist worksteal $(CORE) || exit 1; \
+	done
+
+## audit: ask the package index which of our pinned versions have known vulnerabilities
+audit: $(BIN)/python
+	$(BIN)/python -m pip install --quiet pip-audit
+	$(BIN)/pip-audit --requirement constraints.txt --no-deps --disable-pip
+
+## trust: the long campaigns behind docs/trust.md, some hours; each can be run alone, and with another --count
+trust: $(VENV)/.all
+	for name in $(CAMPAIGNS); do $(BIN)/python -m benchmarks.trust.$$name || exit 1; done
 
 ## lint, types, contracts: what CI checks besides the tests
 lint: $(VENV)/.all
@@ -60,7 +85,7 @@ format: $(VENV)/.all
 	$(BIN)/ruff format .
 
 clean:
-	rm -rf $(VENV) $(OLD) demo site notebooks/build
+	rm -rf $(VENV) $(OLD) .venv-3.* demo site notebooks/build
 
 $(BIN)/python:
 	$(PYTHON) -c 'import sys; sys.exit("hrsnake needs Python 3.11 or newer; try: make demo PYTHON=python3.11" if sys.version_info < (3, 11) else 0)'
@@ -77,5 +102,6 @@ $(VENV)/.all: $(INPUTS) | $(BIN)/python
 
 $(OLD)/.all: pyproject.toml constraints-oldest.txt
 	$(PYTHON) -m venv $(OLD)
-	$(OLD)/bin/python -m pip install --quiet --constraint constraints-oldest.txt --editable '.[rl,play]' pytest hypothesis
+	$(OLD)/bin/python -m pip install --quiet --constraint constraints-oldest.txt --editable '.[rl,play]' \
+		pytest pytest-xdist hypothesis
 	touch $@
