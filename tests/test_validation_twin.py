@@ -32,9 +32,9 @@ def test_checker_and_twin_agree_on_every_figure_and_verdict(seed):
     assert not list(disagreements(case.motion, case.maze, case.arm, case.cores))
 
 
-@pytest.mark.parametrize("number", [2227, 2559])
+@pytest.mark.parametrize("number", [2227, 2559, 6624])
 def test_they_agree_where_they_once_did_not(number):
-    """A joint at the base but for rounding; a link along a wall, but for rounding."""
+    """A joint at the base but for rounding; links along walls, but for rounding."""
     case = draw_case(np.random.default_rng([7, number]))
     assert not list(disagreements(case.motion, case.maze, case.arm, case.cores))
 

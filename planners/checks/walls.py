@@ -80,10 +80,7 @@ def _deepest(scene: Scene, segments: FloatArray) -> Nearest:
     """
     outside = shapely.difference(shapely.linestrings(segments), scene.free)
     parts, owner = shapely.get_parts(outside, return_index=True)
-    # Of a segment that lies on a wall to the last bit but one, pieces in the free space may be left, too.
-    middles = shapely.line_interpolate_point(parts, 0.5, normalized=True)
-    left = ~shapely.is_empty(parts) & ~shapely.intersects(scene.free, middles)
-    parts, owner = parts[left], owner[left]
+    parts, owner = parts[~shapely.is_empty(parts)], owner[~shapely.is_empty(parts)]
     ends = np.stack([shapely.get_coordinates(shapely.get_point(parts, k)) for k in (0, -1)], axis=1)
     walls, accuracy = scene.maze.walls, 0.1 * ROUNDING * scene.length
     # What is not covered is outside, even where rounding leaves nothing of it.
@@ -92,11 +89,15 @@ def _deepest(scene: Scene, segments: FloatArray) -> Nearest:
         rest, of = ends[first : first + CHUNK], owner[first : first + CHUNK]
         while len(rest):
             start, end = (_wall_distances(rest[:, k], walls) for k in (0, 1))
-            reached = np.stack([start.min(axis=1), end.min(axis=1)], axis=1)
+            # Of a segment that lies on a wall but for rounding, GEOS may leave pieces in the free space, too.
+            free = np.stack([shapely.intersects_xy(scene.free, rest[:, k]) for k in (0, 1)], axis=1)
+            reached = np.where(free, 0.0, np.stack([start.min(axis=1), end.min(axis=1)], axis=1))
             best, row, side = worst_of(reached)
             if best > depth:
                 depth, index, place = best, int(of[row]), rest[row, side]
             open_ = np.maximum(start, end).min(axis=1) > depth + accuracy
+            doubtful = np.flatnonzero(open_ & free.all(axis=1))
+            open_[doubtful] = ~shapely.covers(scene.free, shapely.linestrings(rest[doubtful]))
             rest, of = rest[open_], np.repeat(of[open_], 2)
             middle = rest.mean(axis=1)
             rest = np.stack([rest[:, 0], middle, middle, rest[:, 1]], axis=1).reshape(-1, 2, 2)
