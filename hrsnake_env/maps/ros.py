@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import reprlib
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hrsnake_env.errors import InputError
+from hrsnake_env.errors import InputError, brief
 from hrsnake_env.maps.image import Pixels, Placement, decoded, reading_of
 from hrsnake_env.maps.reading import MapFiles, MapOptions, MapReading, scale_and_units
 
@@ -18,7 +17,7 @@ __all__ = ["read_ros"]
 
 MODES = ("trinary", "scale", "raw")
 
-MAX_BYTES = 100_000
+MAX_BYTES = 20_000
 """Of the YAML file, which has ten lines."""
 
 UNSEEN = 205
@@ -124,12 +123,12 @@ def _header(data: bytes, name: str) -> _Header:
     fields = _fields(data, name)
     image = fields.get("image")
     if not isinstance(image, str) or not image:
-        raise InputError(f"Expected the name of an image as 'image' in '{name}', got {reprlib.repr(image)}.")
+        raise InputError(f"Expected the name of an image as 'image' in '{name}', got {brief(image)}.")
     origin = fields.get("origin")
     origin = [_as_written(value) for value in origin] if isinstance(origin, list) else origin
     if not isinstance(origin, list) or len(origin) != 3 or not all(_is_number(value) for value in origin):
         raise InputError(
-            f"Expected 'origin' as three numbers [x, y, yaw] in '{name}', got {reprlib.repr(origin)}."
+            f"Expected 'origin' as three numbers [x, y, yaw] in '{name}', got {brief(origin)}."
         )
     resolution = _number(fields, "resolution", name)
     if resolution <= 0.0:
@@ -142,9 +141,9 @@ def _header(data: bytes, name: str) -> _Header:
         )
     negate, mode = fields.get("negate", 0), fields.get("mode", "trinary")
     if not isinstance(negate, bool | int):
-        raise InputError(f"Expected 'negate' as 0 or 1 in '{name}', got {reprlib.repr(negate)}.")
+        raise InputError(f"Expected 'negate' as 0 or 1 in '{name}', got {brief(negate)}.")
     if mode not in MODES:
-        raise InputError(f"Unknown mode {reprlib.repr(mode)} in '{name}'. Available: {', '.join(MODES)}.")
+        raise InputError(f"Unknown mode {brief(mode)} in '{name}'. Available: {', '.join(MODES)}.")
     return _Header(
         image=image,
         resolution=resolution,
@@ -164,8 +163,12 @@ def _fields(data: bytes, name: str) -> dict[Any, Any]:
     if len(data) > MAX_BYTES:
         raise InputError(f"Expected the YAML file of a ROS map in '{name}', got {len(data):,} bytes.")
     try:
+        if any(isinstance(token, yaml.AliasToken) for token in yaml.scan(data)):
+            raise InputError(f"Expected plain lines in '{name}', got an alias (*), which maps do not have.")
         fields = yaml.safe_load(data)
-    except (yaml.YAMLError, ValueError, OverflowError, RecursionError, TypeError) as error:
+    except InputError:
+        raise
+    except Exception as error:  # the library raises whatever its parts do: of `!!bool x` a KeyError
         place = getattr(error, "problem_mark", None)
         where = "" if place is None else f" in line {place.line + 1}"
         raise InputError(f"Expected YAML in '{name}', got something else{where}.") from None
@@ -193,5 +196,5 @@ def _is_number(value: Any) -> bool:
 def _number(fields: dict[Any, Any], key: str, name: str) -> float:
     value = _as_written(fields.get(key))
     if not _is_number(value):
-        raise InputError(f"Expected a number as '{key}' in '{name}', got {reprlib.repr(value)}.")
+        raise InputError(f"Expected a number as '{key}' in '{name}', got {brief(value)}.")
     return float(value)
