@@ -130,10 +130,12 @@ class _Reader:
         if self._weight(self.document.modelspace(), {}, ()) > MAX_ENTITIES:
             raise InputError(f"Expected at most {MAX_ENTITIES:,} entities in '{self.name}', got more.")
         for entity in self.document.modelspace():
-            yield from self._outlines(entity, "0", None, 0)
+            yield from self._outlines(entity, "0", None, ())
 
-    def _outlines(self, entity: Any, above: str, colour: str | None, depth: int) -> Iterator[Outline]:
-        """Yield an entity's outlines; `above` and `colour` are those of the block it stands in."""
+    def _outlines(
+        self, entity: Any, above: str, colour: str | None, blocks: tuple[str, ...]
+    ) -> Iterator[Outline]:
+        """Yield an entity's outlines; `above` and `colour` are those of the innermost of `blocks` it is in."""
         self.n_entities += 1
         if self.n_entities > MAX_ENTITIES:
             raise InputError(f"Expected at most {MAX_ENTITIES:,} entities in '{self.name}', got more.")
@@ -148,10 +150,10 @@ class _Reader:
             return
         own_colour = self._colour(entity, layer, colour)
         if kind == "INSERT":
-            yield from self._inserted(entity, layer, own_colour, depth)
+            yield from self._inserted(entity, layer, own_colour, blocks)
             return
         if kind == "MLINE":
-            yield from self._inside(entity, layer, own_colour, depth)
+            yield from self._inside(entity, layer, own_colour, blocks)
             return
         try:
             parsed = _parsed(entity)
@@ -193,19 +195,26 @@ class _Reader:
             if name not in known:
                 block = entity.block()
                 known[name] = 0 if block is None else self._weight(block, known, (*under_way, name))
-            total += max(1, entity.mcount) * known[name]
+            total += max(1, entity.mcount) * (1 + known[name])  # empty blocks take their time, too
         return total
 
-    def _inserted(self, insert: Any, layer: str, colour: str | None, depth: int) -> Iterator[Outline]:
-        block = insert.block()
-        if block is None or block.block.dxf.get("flags", 0) & 4 or depth >= MAX_DEPTH:
-            self.left["XREF" if block is not None and depth < MAX_DEPTH else "INSERT"] += 1
+    def _inserted(
+        self, insert: Any, layer: str, colour: str | None, blocks: tuple[str, ...]
+    ) -> Iterator[Outline]:
+        block, name = insert.block(), str(insert.dxf.get("name", "")).casefold()
+        if block is None or name in blocks or len(blocks) >= MAX_DEPTH:
+            self.left["INSERT"] += 1
+            return
+        if block.block.dxf.get("flags", 0) & 4:
+            self.left["XREF"] += 1
             return
         count = insert.mcount
         for one in insert.multi_insert() if count > 1 else (insert,):
-            yield from self._inside(one, layer, colour, depth)
+            yield from self._inside(one, layer, colour, (*blocks, name))
 
-    def _inside(self, entity: Any, layer: str, colour: str | None, depth: int) -> Iterator[Outline]:
+    def _inside(
+        self, entity: Any, layer: str, colour: str | None, blocks: tuple[str, ...]
+    ) -> Iterator[Outline]:
         """Yield what an entity is made of."""
         try:
             inside = list(entity.virtual_entities())
@@ -213,7 +222,7 @@ class _Reader:
             self.broken[entity.dxftype()] += 1
             return
         for part in inside:
-            yield from self._outlines(part, layer, colour, depth + 1)
+            yield from self._outlines(part, layer, colour, blocks)
 
     def _is_hidden(self, entity: Any, layer: str) -> bool:
         entry = self.layers.get(layer.casefold())

@@ -33,6 +33,9 @@ ISLAND = 16
 
 MAX_PIXELS, MAX_VERTICES = 64_000_000, 200_000
 
+MAX_CORNERS = 500_000
+"""Of the free pixels, before outlines become simpler: that takes a minute for noise of millions."""
+
 FORMATS = ("PPM", "PNG", "JPEG", "BMP", "TIFF", "GIF", "WEBP")
 
 BoolArray = NDArray[np.bool_]
@@ -206,10 +209,15 @@ def reading_of(
         If no pixel is free, or the outlines have too many vertices.
     """
     notes = list(notes)
+    if min(free.shape) < 1:
+        raise InputError(f"Expected an image with pixels in '{name}', got none.")
     free, left_out = _without_islands(free)
     if left_out:
         notes.append(f"{left_out} islands of fewer than {ISLAND} free pixels were left out.")
     in_pixels = TOLERANCE if tolerance is None else tolerance / placement.pixel
+    corners = _n_corners(free)
+    if corners > MAX_CORNERS:
+        raise _too_many(MAX_CORNERS, corners, name)
     outlines = free_polygons(free)
     if outlines.is_empty:
         raise InputError(
@@ -220,10 +228,7 @@ def reading_of(
     simple, moved = simplified_inward(outlines, in_pixels)
     count = _n_vertices(simple)
     if count > MAX_VERTICES:
-        raise InputError(
-            f"Expected outlines of at most {MAX_VERTICES:,} vertices in '{name}', got {count:,}: remove "
-            f"specks from the image (a median filter does), make it smaller, or allow a larger tolerance."
-        )
+        raise _too_many(MAX_VERTICES, count, name)
     notes.append(f"{exact:,} vertices along the pixels became {count:,}.")
     turn, pixel = np.exp(1j * placement.yaw), placement.pixel
 
@@ -242,6 +247,21 @@ def reading_of(
         moved=moved * pixel,
         notes=tuple(notes),
     )
+
+
+def _too_many(most: int, count: int, name: str) -> InputError:
+    return InputError(
+        f"Expected outlines of at most {most:,} vertices in '{name}', got {count:,}: remove specks from the "
+        f"image (a median filter does), make it smaller, or allow a larger tolerance."
+    )
+
+
+def _n_corners(free: BoolArray) -> int:
+    """Return the number of corners along the pixels, before they are traced."""
+    padded = np.pad(free, 1)
+    differs = padded[:-1] ^ padded[1:]  # from the pixel below
+    touching = (padded[:-1, :-1] == padded[1:, 1:]) & differs[:, :-1] & differs[:, 1:]
+    return int((differs[:, :-1] ^ differs[:, 1:]).sum() + 2 * touching.sum())
 
 
 def _n_vertices(outlines: Any) -> int:
