@@ -407,9 +407,7 @@ def _geometry(feature: dict[str, Any], role: str, kinds: tuple[str, ...]) -> Any
     data = feature.get("geometry")
     kind = data.get("type") if isinstance(data, dict) else data
     if kind not in kinds:
-        raise InputError(
-            f"Expected the '{role}' feature to be a {' or '.join(kinds)}, got {brief(kind)}."
-        )
+        raise InputError(f"Expected the '{role}' feature to be a {' or '.join(kinds)}, got {brief(kind)}.")
     try:
         with np.errstate(all="ignore"):  # what is not finite is refused below
             geometry = shape(data)

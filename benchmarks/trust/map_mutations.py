@@ -19,7 +19,22 @@ NUMBERS = (
 WORDS = (
     *(b"\x00", b"\xff\xfe", b"\xef\xbb\xbf", b"\x1b[2J", b"\r\n", b"\xed\xa0\x80", b"\xe2\x80\xae", b"[/b]"),
     *(b"../../../../etc/passwd", b"/etc/passwd", b"/dev/zero", b"a" * 3000, b"[" * 2000, b"{" * 2000),
-    *(b'"', b"'", b"<", b">", b"&", b"*a", b"&a ", b"<<: ", b"null", b"true", b"[]", b"{}", b"%s", b"\\ud800"),
+    *(
+        b'"',
+        b"'",
+        b"<",
+        b">",
+        b"&",
+        b"*a",
+        b"&a ",
+        b"<<: ",
+        b"null",
+        b"true",
+        b"[]",
+        b"{}",
+        b"%s",
+        b"\\ud800",
+    ),
 )
 """What is put anywhere."""
 

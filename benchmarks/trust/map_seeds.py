@@ -48,7 +48,17 @@ TAGS = [
     *((3, "B"), (0, "CIRCLE"), (8, "0"), (10, 0.5), (20, 0.5), (40, 0.5), (0, "ENDBLK"), (8, "0")),
     *((0, "ENDSEC"), (0, "SECTION"), (2, "ENTITIES")),
     *((0, "LWPOLYLINE"), (100, "AcDbEntity"), (8, "free"), (100, "AcDbPolyline"), (90, 4), (70, 1)),
-    *((10, 0.0), (20, 0.0), (10, 100.0), (20, 0.0), (42, 0.3), (10, 100.0), (20, 50.0), (10, 0.0), (20, 50.0)),
+    *(
+        (10, 0.0),
+        (20, 0.0),
+        (10, 100.0),
+        (20, 0.0),
+        (42, 0.3),
+        (10, 100.0),
+        (20, 50.0),
+        (10, 0.0),
+        (20, 50.0),
+    ),
     *((0, "LINE"), (8, "w"), (62, 5), (10, 5.0), (20, 5.0), (11, 9.0), (21, 5.0)),
     *((0, "LINE"), (8, "w"), (10, 9.0), (20, 5.0), (11, 9.0), (21, 9.0)),
     *((0, "LINE"), (8, "w"), (10, 9.0), (20, 9.0), (11, 5.0), (21, 5.0)),
@@ -164,7 +174,11 @@ def seeds(kind):
         scale = YAML.replace(b"trinary", b"scale").replace(b"negate: 0", b"negate: 1")
         return tuple((".yaml", data) for data in (YAML, scale, YAML.replace(b"trinary", b"raw")))
     if kind == "svg":
-        return ((".svg", SVG.encode()), (".svg", sample[".svg"]), (".svg", gzip.compress(SVG.encode(), mtime=0)))
+        return (
+            (".svg", SVG.encode()),
+            (".svg", sample[".svg"]),
+            (".svg", gzip.compress(SVG.encode(), mtime=0)),
+        )
     if kind == "dxf":
         return ((".dxf", text_dxf(TAGS)), (".dxf", binary_dxf(TAGS)), (".dxf", text_dxf(TAGS)))
     return _images()
@@ -185,7 +199,14 @@ def _images():
         (".png", encoded(grey.convert("P"), "PNG", transparency=3)),
         (".png", encoded(grey.convert("1"), "PNG")),
         (".png", encoded(grey.convert("I;16"), "PNG")),
-        (".jpg", encoded(grey.convert("RGB"), "JPEG", exif=b"Exif\0\0MM\0*\0\0\0\x08\0\1\1\x12\0\3\0\0\0\1\0\6\0\0\0\0\0\0")),
+        (
+            ".jpg",
+            encoded(
+                grey.convert("RGB"),
+                "JPEG",
+                exif=b"Exif\0\0MM\0*\0\0\0\x08\0\1\1\x12\0\3\0\0\0\1\0\6\0\0\0\0\0\0",
+            ),
+        ),
         (".jpeg", encoded(grey, "JPEG", progressive=True)),
         (".bmp", encoded(grey.convert("RGB"), "BMP")),
         (".bmp", encoded(grey, "BMP")),

@@ -127,9 +127,7 @@ def _header(data: bytes, name: str) -> _Header:
     origin = fields.get("origin")
     origin = [_as_written(value) for value in origin] if isinstance(origin, list) else origin
     if not isinstance(origin, list) or len(origin) != 3 or not all(_is_number(value) for value in origin):
-        raise InputError(
-            f"Expected 'origin' as three numbers [x, y, yaw] in '{name}', got {brief(origin)}."
-        )
+        raise InputError(f"Expected 'origin' as three numbers [x, y, yaw] in '{name}', got {brief(origin)}.")
     resolution = _number(fields, "resolution", name)
     if resolution <= 0.0:
         raise InputError(f"Expected a positive 'resolution' in '{name}', got {resolution:g}.")

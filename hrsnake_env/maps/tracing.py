@@ -15,7 +15,7 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.maps.drawing import Outline, Stroke, counted
 from hrsnake_env.maps.flatten import MAX_POINTS, Trace, flattened
 from hrsnake_env.maps.joining import joined
-from hrsnake_env.maps.nesting import check_crossings
+from hrsnake_env.maps.nesting import check_all_crossings, check_crossings
 
 __all__ = ["OpenLine", "Ring", "Traced", "traced"]
 
@@ -127,6 +127,7 @@ def traced(
                 found.rings.append(ring)
             else:
                 loose.setdefault((role, key, outline.layer), []).append(trace.points)
+    check_all_crossings([ring.points for ring in found.rings])
     for (role, key, _), lines in loose.items():
         _join(found, role, key, lines, gap, same)
     found.notes += [f"{counted(n, what)} left out." for what, n in left.items()]
