@@ -31,7 +31,7 @@ __all__ = [
 MAX_CROSSINGS = 20_000
 """Of one outline with itself, and of all together: more of them are a scribble, and take minutes."""
 
-MAX_PAIRS = 2_000_000
+MAX_PAIRS = 200_000
 """Of outlines whose bounds meet."""
 
 N_PROBES = 500

@@ -20,6 +20,12 @@ MODES = ("trinary", "scale", "raw")
 MAX_BYTES = 20_000
 """Of the YAML file, which has ten lines."""
 
+MAX_DEPTH = 10
+"""Brackets within brackets."""
+
+LONGEST_NAME = 300
+"""Characters of the path of an image."""
+
 UNSEEN = 205
 """The grey in which map savers write what nobody has seen."""
 
@@ -122,7 +128,7 @@ def _warnings(pixels: Pixels, header: _Header, options: MapOptions) -> list[str]
 def _header(data: bytes, name: str) -> _Header:
     fields = _fields(data, name)
     image = fields.get("image")
-    if not isinstance(image, str) or not image:
+    if not isinstance(image, str) or not 0 < len(image) <= LONGEST_NAME:
         raise InputError(f"Expected the name of an image as 'image' in '{name}', got {brief(image)}.")
     origin = fields.get("origin")
     origin = [_as_written(value) for value in origin] if isinstance(origin, list) else origin
@@ -161,8 +167,7 @@ def _fields(data: bytes, name: str) -> dict[Any, Any]:
     if len(data) > MAX_BYTES:
         raise InputError(f"Expected the YAML file of a ROS map in '{name}', got {len(data):,} bytes.")
     try:
-        if any(isinstance(token, yaml.AliasToken) for token in yaml.scan(data)):
-            raise InputError(f"Expected plain lines in '{name}', got an alias (*), which maps do not have.")
+        _check_plain(yaml, data, name)
         fields = yaml.safe_load(data)
     except InputError:
         raise
@@ -175,6 +180,19 @@ def _fields(data: bytes, name: str) -> dict[Any, Any]:
             f"Expected 'image: ...', 'resolution: ...' and so on in '{name}', got no such lines."
         )
     return fields
+
+
+def _check_plain(yaml: Any, data: bytes, name: str) -> None:
+    """Refuse what a few bytes of YAML make endless: aliases, and brackets in brackets."""
+    depth = 0
+    for token in yaml.scan(data):
+        kind = type(token).__name__
+        if kind == "AliasToken":
+            raise InputError(f"Expected plain lines in '{name}', got an alias (*), which maps do not have.")
+        depth += kind in ("FlowSequenceStartToken", "FlowMappingStartToken")
+        depth -= kind in ("FlowSequenceEndToken", "FlowMappingEndToken")
+        if depth > MAX_DEPTH:
+            raise InputError(f"Expected plain lines in '{name}', got brackets {MAX_DEPTH} deep.")
 
 
 def _as_written(value: Any) -> Any:
