@@ -6,6 +6,7 @@ import gzip
 import io
 import math
 import re
+import zlib
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import PurePath
@@ -96,7 +97,7 @@ def _plain(data: bytes, name: str) -> bytes:
         try:
             with gzip.open(io.BytesIO(data)) as packed:
                 data = packed.read(MAX_BYTES + 1)
-        except (OSError, EOFError):
+        except (OSError, EOFError, zlib.error):
             raise InputError(f"Expected a whole compressed SVG in '{name}', got a broken one.") from None
     if len(data) > MAX_BYTES:
         raise InputError(f"Expected at most {MAX_BYTES >> 20} MiB in '{name}', got more.")
