@@ -139,9 +139,7 @@ def _checked_tree(data: bytes, name: str) -> ElementTree.Element:
 
 
 def _check_numbers(root: ElementTree.Element, name: str) -> None:
-    n = sum(
-        len(NUMBER.findall(element.get(key, ""))) for element in root.iter() for key in ("d", "points")
-    )
+    n = sum(len(NUMBER.findall(element.get(key, ""))) for element in root.iter() for key in ("d", "points"))
     if n > MAX_NUMBERS:
         raise InputError(f"Expected at most {MAX_NUMBERS:,} numbers in paths in '{name}', got {n:,}.")
 
