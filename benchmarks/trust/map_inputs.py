@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import gzip
 import json
+import re
 import struct
 import zlib
 from dataclasses import dataclass, field
@@ -80,9 +82,51 @@ def _broken(kind, data, others, rng):
             return (binary_dxf if data.startswith(b"AutoCAD Binary") else text_dxf)(tags)
         except (struct.error, UnicodeEncodeError):  # a number that its place does not hold
             return text_dxf(tags)
+    if kind == "image" and rng.random() < 0.4:
+        return _other_image(rng)
+    gentle = rng.random() < 0.6
+    if kind == "svg" and gentle:
+        plain = gzip.decompress(data) if data[:2] == b"\x1f\x8b" else data
+        return mutated(_other_elements(plain, rng), rng, others, gentle=True)
     if data[:2] == b"\x1f\x8b" and rng.random() < 0.8:
         return gzip.compress(mutated(gzip.decompress(data), rng, others), 1, mtime=0)
-    return mutated(data, rng, others)
+    return mutated(data, rng, others, gentle)
+
+
+ELEMENT = re.compile(rb"<[a-z]+ [^<>]*/>")
+
+
+def _other_elements(data, rng):
+    """Repeat, leave out or move one to three elements of a drawing that hold no others."""
+    for _ in range(int(rng.integers(1, 4))):
+        found = list(ELEMENT.finditer(data))
+        if not found:
+            return data
+        one, other = (found[int(rng.integers(0, len(found)))] for _ in range(2))
+        copies = one.group() * int(rng.choice([0, 1, 2, 20]))
+        data = data[: other.start()] + copies + data[other.end() :]
+    return data
+
+
+def _other_image(rng):
+    """Return a whole image of random shapes, size, kind of pixels and format."""
+    wide, high = (int(rng.choice([1, 2, 7, 31, 64, 130])) for _ in range(2))
+    level = np.full((high, wide), int(rng.choice([0, 205, 254])), dtype=np.uint8)
+    for _ in range(int(rng.integers(0, 12))):
+        (x, y), side = rng.integers(0, (wide, high)), int(rng.integers(1, 40))
+        level[y : y + side, x : x + int(rng.integers(1, 40))] = int(rng.choice([0, 100, 205, 255]))
+    noise = rng.random(level.shape) < float(rng.choice([0.0, 0.0, 0.02, 0.5]))
+    level[noise] = rng.integers(0, 256, int(noise.sum()))
+    mode, form = str(rng.choice(MODES)), str(rng.choice(FORMATS))
+    image = Image.fromarray(level)
+    try:
+        return encoded(image if mode == "L" else image.convert(mode), form)
+    except (OSError, ValueError):  # not every format has every kind of pixels
+        return encoded(image, form)
+
+
+MODES = ("L", "L", "1", "P", "RGB", "RGBA", "LA", "I", "I;16", "F", "CMYK", "YCbCr", "PA")
+FORMATS = ("PPM", "PNG", "BMP", "TIFF", "GIF", "JPEG", "WEBP")
 
 
 def _other_tags(tags, rng):
@@ -147,11 +191,11 @@ def _other_value(value, rng):
         if change == 0:
             del holder[key]
         elif change == 1 and isinstance(holder, list):
-            holder[key:key] = [inner] * int(rng.integers(1, 30))
+            holder[key:key] = [copy.deepcopy(inner) for _ in range(int(rng.integers(1, 30)))]
         elif change == 2 and isinstance(inner, int | float) and abs(inner) < 1e300:
             holder[key] = inner * float(rng.choice([-1.0, 1e-9, 1e9, 1.0 + 1e-15, 1e60]))
         else:
-            holder[key] = ODD[int(rng.integers(0, len(ODD)))]
+            holder[key] = copy.deepcopy(ODD[int(rng.integers(0, len(ODD)))])
     return value
 
 

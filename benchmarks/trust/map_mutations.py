@@ -42,7 +42,7 @@ NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 WORD = re.compile(rb"[A-Za-z_$#][A-Za-z0-9_$#-]*")
 
 
-def mutated(data, rng, others=()):
+def mutated(data, rng, others=(), gentle=False):
     """Return a file with one to four faults in it.
 
     Parameters
@@ -51,9 +51,12 @@ def mutated(data, rng, others=()):
     rng : numpy.random.Generator
     others : sequence of bytes
         Files of the same kind, to take parts from.
+    gentle : bool
+        Change numbers, words and lines alone, so that most readers go on.
     """
+    changes = GENTLE if gentle else CHANGES
     for _ in range(int(rng.integers(1, 5))):
-        change = CHANGES[int(rng.integers(0, len(CHANGES)))]
+        change = changes[int(rng.integers(0, len(changes)))]
         data = change(data, rng, others)
     return data[:300_000]
 
@@ -179,6 +182,8 @@ def nested_deeply(data, rng, others):
     n, place = int(rng.choice([3, 50, 1000, 100_000 // len(opening)])), _place(data, rng)
     return data[:place] + opening * n + closing * n + data[place:]
 
+
+GENTLE = (other_numbers, near_numbers, near_numbers, other_words)
 
 CHANGES = (
     *(turned_bit, other_bytes, other_header, less, cut_off, again, word_in, part_of_other),
