@@ -14,7 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks.trust.fuzz_maps import attack, faults_in
-from benchmarks.trust.map_inputs import ATTACKS, KINDS
+from benchmarks.trust.map_attacks import ATTACKS
+from benchmarks.trust.map_inputs import KINDS
 from benchmarks.trust.map_mutations import mutated
 from benchmarks.trust.map_seeds import OUTLINES, seeds
 from hrsnake_env.errors import LONGEST_MESSAGE, InputError, brief, printable

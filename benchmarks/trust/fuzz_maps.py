@@ -2,10 +2,10 @@
 
     python -m benchmarks.trust.fuzz_maps --count 10000
 
-Each reader (GeoJSON, ROS maps, images, SVG, DXF) gets so many drawn inputs, after the attacks that have names.
+Each reader (GeoJSON, ROS maps, images, SVG, DXF) gets so many drawn inputs, after attacks that have names.
 They are read in a process of its own with limits; what hangs or dies there is a fault, and reading goes on in
-a new one. A share goes through `Maze.load`, through memory as uploads do, and through `hrsnake import`. Inputs
-that break a law go to `benchmarks/results/trust/fuzz_maps/`, figures to `benchmarks/results/trust/fuzz_maps.json`.
+a new one. A share goes through `Maze.load`, through memory as uploads do, and through `hrsnake import`.
+Inputs that break a law go to `benchmarks/results/trust/fuzz_maps/`, figures to `fuzz_maps.json` beside it.
 With --atheris, coverage says which inputs to go on with; it needs the package of that name.
 """
 
@@ -24,7 +24,8 @@ from pathlib import Path
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from benchmarks.trust.map_inputs import ATTACKS, KINDS, Input, drawn
+from benchmarks.trust.map_attacks import ATTACKS
+from benchmarks.trust.map_inputs import KINDS, Input, drawn
 from benchmarks.trust.map_laws import LAWS, SECONDS, empty_folder, fault_of, limit_memory, watch_files
 from benchmarks.trust.map_seeds import seeds
 
@@ -119,7 +120,7 @@ def keep(kind, seed, task, folder):
     for name, data in given.files.items():
         (place / name).write_bytes(data)
     if isinstance(task, int):
-        return f"--kind {kind} --seed {seed} --first {task} --count 1 ({given.how}, {given.options or 'no options'})"
+        return f"--kind {kind} --seed {seed} --first {task} --count 1 ({given.how}, {given.options})"
     return f"--kind {kind} --attacks: {task[0]}"
 
 

@@ -15,7 +15,7 @@ __all__ = ["guided"]
 
 
 def guided(kind, count, seed):
-    """Read so many inputs of a kind that coverage chooses; end the process with an error at the first fault."""
+    """Read so many inputs of a kind that coverage chooses; end the process at the first fault."""
     try:
         import atheris
     except ImportError:

@@ -1,13 +1,11 @@
 """Faults for map files: bytes that are turned, cut and mixed, odd numbers and words, nesting without end.
 
-Everything is drawn from a NumPy generator, so the same seed gives the same faults. Nothing but NumPy is needed.
+Everything is drawn from a NumPy generator: the same seed gives the same faults. Only NumPy is needed.
 """
 
 from __future__ import annotations
 
 import re
-
-import numpy as np
 
 NUMBERS = (
     *(b"0", b"-0.0", b"-1", b"1", b"0.5", b"1e308", b"-1e308", b"1e999", b"1e-320", b"1e100", b"1e-9"),

@@ -135,7 +135,7 @@ class _Reader:
     def _outlines(
         self, entity: Any, above: str, colour: str | None, blocks: tuple[str, ...]
     ) -> Iterator[Outline]:
-        """Yield an entity's outlines; `above` and `colour` are those of the innermost of `blocks` it is in."""
+        """Yield an entity's outlines; `above` and `colour` are those of the innermost of its `blocks`."""
         try:
             yield from self._outlines_of(entity, above, colour, blocks)
         except InputError:

@@ -64,8 +64,8 @@ def check_all_crossings(lines: Sequence[FloatArray]) -> None:
     """
     if _n_crossings(lines) > MAX_CROSSINGS:
         raise InputError(
-            f"Expected outlines that cross each other at most {MAX_CROSSINGS:,} times, got a scribble: ignore "
-            f"layers that are not needed."
+            f"Expected outlines that cross each other at most {MAX_CROSSINGS:,} times, got a scribble: "
+            f"ignore layers that are not needed."
         )
 
 
