@@ -188,11 +188,13 @@ def _check_plain(yaml: Any, data: bytes, name: str) -> None:
     for token in yaml.scan(data):
         kind = type(token).__name__
         if kind == "AliasToken":
-            raise InputError(f"Expected plain lines in '{name}', got an alias (*), which maps do not have.")
+            raise InputError(
+                f"Expected plain lines of YAML in '{name}', got an alias (*), which maps do not have."
+            )
         depth += kind in ("FlowSequenceStartToken", "FlowMappingStartToken")
         depth -= kind in ("FlowSequenceEndToken", "FlowMappingEndToken")
         if depth > MAX_DEPTH:
-            raise InputError(f"Expected plain lines in '{name}', got brackets {MAX_DEPTH} deep.")
+            raise InputError(f"Expected plain lines of YAML in '{name}', got brackets {MAX_DEPTH} deep.")
 
 
 def _as_written(value: Any) -> Any:
