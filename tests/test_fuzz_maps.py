@@ -4,6 +4,7 @@ The campaign with ten thousand inputs for each reader is `benchmarks/trust/fuzz_
 """
 
 import json
+import math
 import os
 import sys
 
@@ -19,8 +20,11 @@ from benchmarks.trust.map_inputs import KINDS
 from benchmarks.trust.map_mutations import mutated
 from benchmarks.trust.map_seeds import OUTLINES, seeds
 from hrsnake_env.errors import LONGEST_MESSAGE, InputError, brief, printable
-from hrsnake_env.maps import MapReading, read_map
+from hrsnake_env.maps import MapOptions, MapReading, read_map
+from hrsnake_env.maps.drawing import Drawing, Outline, Stroke
+from hrsnake_env.maps.flatten import Arc, Line
 from hrsnake_env.maps.joining import joined
+from hrsnake_env.maps.outlines import read_outlines
 from hrsnake_env.maze import Maze
 
 ENDINGS = (".geojson", ".yaml", ".pgm", ".png", ".svg", ".dxf")
@@ -121,6 +125,17 @@ def test_lines_that_meet_in_one_point_are_joined_however_many_they_are():
     tips = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     rings, rest = joined([np.stack([np.zeros(2), tip]) for tip in tips], 1e-9)
     assert len(rings) == 0 and len(rest) == len(tips)
+
+
+@pytest.mark.parametrize("angle", [math.nan, math.inf])
+def test_arcs_of_no_angle_are_left_out(angle):
+    room = Outline(
+        strokes=(Stroke(pieces=(Line(points=np.array([[0.0, 0.0], [9, 0], [9, 9]])),), closed=True),)
+    )
+    half = np.array([2.0, 0.0]), np.array([0.0, 2.0])
+    arc = Arc(centre=np.array([6.0, 3.0]), major=half[0], minor=half[1], sweep=angle)
+    drawing = Drawing(name="a", outlines=[room, Outline(strokes=(Stroke(pieces=(arc,)),))])
+    assert read_outlines(drawing, MapOptions()).free_space.area == 40.5
 
 
 def test_ends_that_are_nearly_one_move_to_the_first_of_them():
