@@ -28,7 +28,7 @@ from hrsnake_env.maps.outlines import read_outlines
 from hrsnake_env.maze import Maze
 
 ENDINGS = (".geojson", ".yaml", ".pgm", ".png", ".svg", ".dxf")
-HEAVY = {"white", "sixty million pixels that are not there", "packed path", "packed spaces", "long spline"}
+HEAVY = {"white", "sixty million pixels that are not there", "packed path", "packed spaces", "a long spline"}
 """Attacks that are left to the campaign: they take a second each."""
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageOps, UnidentifiedImageError
 from scipy import ndimage
 
-from hrsnake_env.errors import InputError
+from hrsnake_env.errors import InputError, printable
 from hrsnake_env.maps.raster import free_polygons
 from hrsnake_env.maps.reading import MapFiles, MapOptions, MapReading, scale_and_units
 from hrsnake_env.maps.simplify import simplified_inward
@@ -158,7 +158,9 @@ def decoded(data: bytes, name: str) -> Pixels:
     except InputError:
         raise
     except Exception as error:  # damaged images make the library raise whatever its parts do
-        raise InputError(f"Expected a whole image in '{name}', got a damaged one: {error}.") from None
+        raise InputError(
+            f"Expected a whole image in '{name}', got a damaged one: {printable(str(error), 200)}."
+        ) from None
 
 
 def _pixels(image: Image.Image, name: str) -> Pixels:

@@ -16,7 +16,7 @@ from xml.parsers import expat
 
 import numpy as np
 
-from hrsnake_env.errors import InputError
+from hrsnake_env.errors import InputError, printable
 from hrsnake_env.maps.drawing import Drawing, Outline, Stroke, counted
 from hrsnake_env.maps.flatten import MAX_POINTS, Arc, Bezier, Line, Piece
 from hrsnake_env.maps.outlines import read_outlines
@@ -132,7 +132,9 @@ def _checked_tree(data: bytes, name: str) -> ElementTree.Element:
     except (expat.ExpatError, ElementTree.ParseError, LookupError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"Expected an SVG drawing in '{name}', got broken XML: {error}.") from None
+        raise InputError(
+            f"Expected an SVG drawing in '{name}', got broken XML: {printable(str(error), 200)}."
+        ) from None
     if _tag(root) != "svg":
         raise InputError(f"Expected an SVG drawing in '{name}', got <{_tag(root)}>.")
     return root
