@@ -28,7 +28,11 @@ from hrsnake_env.maps.outlines import read_outlines
 from hrsnake_env.maze import Maze
 
 ENDINGS = (".geojson", ".yaml", ".pgm", ".png", ".svg", ".dxf")
-HEAVY = {"white", "sixty million pixels that are not there", "packed path", "packed spaces", "a long spline"}
+HEAVY = {
+    *("white", "sixty million pixels that are not there", "packed path", "packed spaces", "a long spline"),
+    *("squares that overlap", "free squares that overlap", "free circles that overlap", "lines that cross"),
+    *("some uses", "noise", "long type", "long kind"),
+}
 """Attacks that are left to the campaign: they take a second each."""
 
 
@@ -41,12 +45,12 @@ def test_no_attack_brings_a_reader_down(kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_broken_files_are_refused_in_a_sentence_or_read(kind):
-    found = {number: fault for number, fault in faults_in(kind, 1, range(40)) if fault is not None}
+    found = {number: fault for number, fault in faults_in(kind, 1, range(25)) if fault is not None}
     assert found == {}
 
 
 def test_attacks_on_mazes_are_refused_in_a_sentence():
-    tasks = [(name, name, "maze") for name in ATTACKS["geojson"]]
+    tasks = [(name, name, "maze") for name in ATTACKS["geojson"] if name not in HEAVY or "long" in name]
     assert [(task[0], fault) for task, fault in faults_in("geojson", 0, tasks) if fault is not None] == []
 
 
