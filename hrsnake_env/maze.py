@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,13 +20,25 @@ from shapely.validation import explain_validity
 
 from hrsnake_env.arguments import is_number
 from hrsnake_env.arm import ArmSpec, FloatArray
-from hrsnake_env.errors import InputError
+from hrsnake_env.errors import InputError, brief, printable
 from hrsnake_env.files import replacing
 
 __all__ = ["MAZES", "RUNG_MAZES", "SEEDED_MAZES", "Maze"]
 
 MITRE_LIMIT = 10.0
 """Corridor corners sharper than about 11 degrees are cut off; all others are square."""
+
+MOST = sys.float_info.max
+"""That a number holds; integers of a file may be larger."""
+
+FARTHEST = 1e100
+"""Of coordinates: products of those beyond are infinite."""
+
+MAX_BYTES = 256 * 2**20
+"""Of a maze file."""
+
+LONGEST_NAME = 200
+"""Characters of a maze's name and units; a file may have a book there."""
 
 MAZES: dict[str, Callable[[], Maze]] = {}
 """The builders of the named mazes, in the order in which they are listed; `hrsnake_env.mazes` fills it."""
@@ -208,7 +221,7 @@ class Maze:
         """
         if not isinstance(data, dict) or data.get("type") != "FeatureCollection":
             kind = data.get("type") if isinstance(data, dict) else type(data).__name__
-            raise InputError(f"Expected a GeoJSON FeatureCollection, got {kind!r}.")
+            raise InputError(f"Expected a GeoJSON FeatureCollection, got {brief(kind)}.")
         features = _features_by_role(data.get("features"))
         free = [_geometry(feature, "free", ("Polygon", "MultiPolygon")) for feature in features["free"]]
         base, goal = features["base"][0], features["goal"][0]
@@ -216,12 +229,12 @@ class Maze:
         goal_point = _geometry(goal, "goal", ("Point",))
         heading = math.radians(_number(base, "base", "heading_deg"))
         return cls(
-            name=str(data.get("name", default_name)),
+            name=_text(data.get("name", default_name)),
             free_space=free[0] if len(free) == 1 else _union(free),
             base_pose=np.array([base_point.x, base_point.y, heading]),
             goal=np.array([goal_point.x, goal_point.y]),
             goal_radius=_number(goal, "goal", "radius"),
-            units=str(data.get("units", "px")),
+            units=_text(data.get("units", "px")),
         )
 
     def to_geojson(self) -> dict[str, Any]:
@@ -321,6 +334,8 @@ def _checked_parts(free_space: Any) -> list[Polygon]:
         )
     if free_space.is_empty:
         raise InputError("Expected a free space with an area, got an empty polygon.")
+    if not np.abs(free_space.bounds).max() <= FARTHEST:
+        raise InputError(f"Expected a free space with coordinates of at most {FARTHEST:g}, got larger ones.")
     if not free_space.is_valid:
         raise InputError(
             f"Expected a valid polygon as free space, got one with: {explain_validity(free_space)}."
@@ -363,12 +378,20 @@ def _free_length(ray: LineString, walls: Any) -> float:
 
 def _read_json(path: Path) -> Any:
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        if path.exists() and not path.is_file():  # a pipe would be waited for
+            raise InputError(f"Expected a maze file at '{path}', got a folder or a device.")
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError(f"Expected a maze file of at most {MAX_BYTES >> 20} MiB at '{path}', got more.")
+        return json.loads(path.read_bytes())
     except FileNotFoundError:
         raise InputError(f"Expected a maze file at '{path}', but there is none.") from None
     except OSError as error:
         raise InputError(f"Expected a readable maze file at '{path}', got: {error.strerror}.") from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+    except RecursionError:
+        raise InputError(f"Expected a maze in '{path}', got lists nested too deeply.") from None
+    except InputError:
+        raise
+    except ValueError as error:
         raise InputError(f"Expected JSON in '{path}', got: {error}.") from None
 
 
@@ -377,7 +400,7 @@ def _features_by_role(features: Any) -> dict[str, list[dict[str, Any]]]:
     for feature in features if isinstance(features, list) else []:
         properties = feature.get("properties") if isinstance(feature, dict) else None
         role = properties.get("role") if isinstance(properties, dict) else None
-        if role in by_role:
+        if isinstance(role, str) and role in by_role:
             by_role[role].append(feature)
     for role, found in by_role.items():
         if not found or (role != "free" and len(found) > 1):
@@ -390,10 +413,14 @@ def _geometry(feature: dict[str, Any], role: str, kinds: tuple[str, ...]) -> Any
     data = feature.get("geometry")
     kind = data.get("type") if isinstance(data, dict) else data
     if kind not in kinds:
-        raise InputError(f"Expected the '{role}' feature to be a {' or '.join(kinds)}, got {kind!r}.")
+        raise InputError(f"Expected the '{role}' feature to be a {' or '.join(kinds)}, got {brief(kind)}.")
     try:
-        geometry = shape(data)
-    except (TypeError, ValueError, KeyError, IndexError, AttributeError, shapely.errors.ShapelyError):
+        with np.errstate(all="ignore"):  # what is not finite is refused below
+            geometry = shape(data)
+    except (
+        *(TypeError, ValueError, KeyError, IndexError, AttributeError, OverflowError),
+        *(RecursionError, shapely.errors.ShapelyError),
+    ):
         raise InputError(
             f"Expected {kind} coordinates in the '{role}' feature, got none that can be read."
         ) from None
@@ -404,10 +431,16 @@ def _geometry(feature: dict[str, Any], role: str, kinds: tuple[str, ...]) -> Any
     return shapely.force_2d(geometry)
 
 
+def _text(value: Any) -> str:
+    return printable(value if isinstance(value, str) else brief(value), LONGEST_NAME)
+
+
 def _number(feature: dict[str, Any], role: str, key: str) -> float:
     value = feature["properties"].get(key)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"Expected a number as properties.{key} of the '{role}' feature, got {value!r}.")
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= MOST:
+        raise InputError(
+            f"Expected a number as properties.{key} of the '{role}' feature, got {brief(value)}."
+        )
     return float(value)
 
 

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.contacts import PINCH_TOLERANCE, PinchReport
@@ -46,11 +48,12 @@ World = Maze | Workspace
 
 def show_rows(title: str, rows: Rows) -> None:
     """Print a table of names and figures."""
-    table = Table(title=title, title_justify="left", show_header=False, box=box.SIMPLE_HEAD)
+    # Names out of files may look like rich's markup.
+    table = Table(title=escape(title), title_justify="left", show_header=False, box=box.SIMPLE_HEAD)
     table.add_column(style="bold")
     table.add_column(overflow="fold")
     for name, figure in rows:
-        table.add_row(name, figure)
+        table.add_row(Text(name), Text(figure))
     Console().print(table)
 
 

@@ -293,7 +293,7 @@ def test_missing_and_broken_files_are_told_apart(tmp_path):
     broken.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match="Expected JSON in"):
         Maze.load(broken)
-    with pytest.raises(InputError, match="Expected a readable maze file"):
+    with pytest.raises(InputError, match="got a folder or a device"):
         (tmp_path / "folder.geojson").mkdir()
         Maze.load(tmp_path / "folder.geojson")
 

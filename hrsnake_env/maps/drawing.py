@@ -164,9 +164,17 @@ def sound(drawing: Drawing) -> tuple[list[Outline], list[str]]:
         strokes = tuple(stroke for stroke in outline.strokes if stroke.pieces)
         if not strokes:
             continue
-        hull = np.concatenate([stroke.hull for stroke in strokes])
+        with np.errstate(all="ignore"):  # of what is left out here
+            hull = np.concatenate([stroke.hull for stroke in strokes])
         n_points += len(hull)
-        if not np.isfinite(hull).all() or np.abs(hull).max() > 1e100:
+        angles = [
+            angle
+            for stroke in strokes
+            for piece in stroke.pieces
+            if isinstance(piece, Arc)
+            for angle in (piece.start, piece.sweep)
+        ]
+        if not (np.isfinite(hull).all() and np.abs(hull).max() <= 1e100 and np.isfinite(angles).all()):
             broken += 1
             continue
         kept.append(outline)

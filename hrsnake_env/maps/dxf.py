@@ -55,7 +55,7 @@ def read_dxf(name: str, files: MapFiles, options: MapOptions) -> MapReading:
     if len(data) > MAX_BYTES:
         raise InputError(f"Expected at most {MAX_BYTES >> 20} MiB in '{name}', got more.")
     document, notes = _document(data, name)
-    units = UNITS.get(int(document.header.get("$INSUNITS", 0) or 0))
+    units = UNITS.get(document.header.get("$INSUNITS", 0))
     reader = _Reader(document, name)
     outlines = list(reader.outlines())
     notes.insert(0, f"DXF drawing of {counted(len(outlines), 'outline')}.")
@@ -130,10 +130,22 @@ class _Reader:
         if self._weight(self.document.modelspace(), {}, ()) > MAX_ENTITIES:
             raise InputError(f"Expected at most {MAX_ENTITIES:,} entities in '{self.name}', got more.")
         for entity in self.document.modelspace():
-            yield from self._outlines(entity, "0", None, 0)
+            yield from self._outlines(entity, "0", None, ())
 
-    def _outlines(self, entity: Any, above: str, colour: str | None, depth: int) -> Iterator[Outline]:
-        """Yield an entity's outlines; `above` and `colour` are those of the block it stands in."""
+    def _outlines(
+        self, entity: Any, above: str, colour: str | None, blocks: tuple[str, ...]
+    ) -> Iterator[Outline]:
+        """Yield an entity's outlines; `above` and `colour` are those of the innermost of its `blocks`."""
+        try:
+            yield from self._outlines_of(entity, above, colour, blocks)
+        except InputError:
+            raise
+        except Exception:  # damaged entities make the library raise whatever its parts do
+            self.broken[entity.dxftype()] += 1
+
+    def _outlines_of(
+        self, entity: Any, above: str, colour: str | None, blocks: tuple[str, ...]
+    ) -> Iterator[Outline]:
         self.n_entities += 1
         if self.n_entities > MAX_ENTITIES:
             raise InputError(f"Expected at most {MAX_ENTITIES:,} entities in '{self.name}', got more.")
@@ -148,17 +160,14 @@ class _Reader:
             return
         own_colour = self._colour(entity, layer, colour)
         if kind == "INSERT":
-            yield from self._inserted(entity, layer, own_colour, depth)
+            yield from self._inserted(entity, layer, own_colour, blocks)
             return
         if kind == "MLINE":
-            yield from self._inside(entity, layer, own_colour, depth)
+            yield from self._inside(entity, layer, own_colour, blocks)
             return
         try:
             parsed = _parsed(entity)
-        except InputError:
-            self.broken[kind] += 1
-            return
-        except Exception:  # damaged entities make the library raise whatever its parts do
+        except InputError:  # of one spline, not of the drawing
             self.broken[kind] += 1
             return
         if parsed is None:
@@ -191,29 +200,30 @@ class _Reader:
             if not name or name in under_way or len(under_way) > MAX_DEPTH:
                 continue
             if name not in known:
-                block = entity.block()
+                block = self.document.blocks.get(name)
                 known[name] = 0 if block is None else self._weight(block, known, (*under_way, name))
-            total += max(1, entity.mcount) * known[name]
+            total += _count(entity) * (1 + known[name])  # empty blocks take their time, too
         return total
 
-    def _inserted(self, insert: Any, layer: str, colour: str | None, depth: int) -> Iterator[Outline]:
-        block = insert.block()
-        if block is None or block.block.dxf.get("flags", 0) & 4 or depth >= MAX_DEPTH:
-            self.left["XREF" if block is not None and depth < MAX_DEPTH else "INSERT"] += 1
+    def _inserted(
+        self, insert: Any, layer: str, colour: str | None, blocks: tuple[str, ...]
+    ) -> Iterator[Outline]:
+        block, name = insert.block(), str(insert.dxf.get("name", "")).casefold()
+        if block is None or name in blocks or len(blocks) >= MAX_DEPTH:
+            self.left["INSERT"] += 1
             return
-        count = insert.mcount
-        for one in insert.multi_insert() if count > 1 else (insert,):
-            yield from self._inside(one, layer, colour, depth)
+        if block.block.dxf.get("flags", 0) & 4:
+            self.left["XREF"] += 1
+            return
+        for one in insert.multi_insert() if _count(insert) > 1 else (insert,):
+            yield from self._inside(one, layer, colour, (*blocks, name))
 
-    def _inside(self, entity: Any, layer: str, colour: str | None, depth: int) -> Iterator[Outline]:
+    def _inside(
+        self, entity: Any, layer: str, colour: str | None, blocks: tuple[str, ...]
+    ) -> Iterator[Outline]:
         """Yield what an entity is made of."""
-        try:
-            inside = list(entity.virtual_entities())
-        except Exception:  # as above
-            self.broken[entity.dxftype()] += 1
-            return
-        for part in inside:
-            yield from self._outlines(part, layer, colour, depth + 1)
+        for part in list(entity.virtual_entities()):
+            yield from self._outlines(part, layer, colour, blocks)
 
     def _is_hidden(self, entity: Any, layer: str) -> bool:
         entry = self.layers.get(layer.casefold())
@@ -241,6 +251,14 @@ class _Reader:
                 rgb = colors.aci2rgb(index) if 0 < index < 256 else (255, 255, 255)
         red, green, blue = rgb
         return f"#{red:02x}{green:02x}{blue:02x}"
+
+
+def _count(insert: Any) -> int:
+    """Return how often a block is inserted; damaged drawings have fractions and words there."""
+    try:
+        return max(1, int(insert.mcount))
+    except (TypeError, ValueError, OverflowError):
+        return 1
 
 
 def _hidden(n: int) -> str:

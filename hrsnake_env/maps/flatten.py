@@ -223,7 +223,7 @@ def _chords_of_arc(arc: Arc, tolerance: float) -> tuple[FloatArray, FloatArray, 
         return np.tile(arc.centre, (2, 1)), np.tile(arc.centre, (1, 1, 1)), 0.0
     # Tangents at both ends of a chord of half angle h meet sin(h) tan(h) over it, on the unit circle; with
     # h = 0.975 sqrt(k) and h < 0.5 that is less than k.
-    half = 0.975 * math.sqrt(min(tolerance / stretch, 0.25))
+    half = 0.975 * math.sqrt(min(max(tolerance / stretch, 1e-30), 0.25))
     n = max(1, math.ceil(abs(arc.sweep) / (2.0 * half)))
     _check_number(n)
     half = abs(arc.sweep) / (2 * n)

@@ -12,7 +12,7 @@ from shapely.geometry import LineString, MultiPolygon, Polygon
 
 from hrsnake_env.arm import FloatArray
 from hrsnake_env.maps.drawing import counted
-from hrsnake_env.maps.nesting import even_odd, filled, nested, odd, polygons, without
+from hrsnake_env.maps.nesting import check_all_crossings, even_odd, filled, nested, odd, polygons, without
 from hrsnake_env.maps.tracing import Ring, Traced
 
 __all__ = ["free_space_of"]
@@ -118,6 +118,8 @@ def _floor_plan(
 
 def _thick_walls(drawn: Traced, thickness: float, table: dict[str, str], notes: list[str]) -> list[Area]:
     """Return open lines as walls, or say that they were left out."""
+    if thickness > 0.0:
+        check_all_crossings([line.points for line in drawn.open_lines])
     walls = []
     left: Counter[str] = Counter()
     for line in drawn.open_lines:

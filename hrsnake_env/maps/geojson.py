@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import PurePath
@@ -13,7 +14,7 @@ import numpy as np
 import shapely
 from shapely.geometry import Point
 
-from hrsnake_env.errors import InputError
+from hrsnake_env.errors import InputError, printable
 from hrsnake_env.maps.drawing import Drawing, Outline, Stroke, counted, factor
 from hrsnake_env.maps.flatten import Line
 from hrsnake_env.maps.outlines import read_outlines
@@ -23,6 +24,7 @@ from hrsnake_env.maze import Maze
 __all__ = ["read_geojson"]
 
 MAX_BYTES = 256 * 2**20
+LONGEST_TITLE = 80
 NAMING = ("role", "layer", "Layer", "name", "kind", "type", "class")
 """Properties that name a feature, the most specific first; the first of them there is its layer."""
 
@@ -57,9 +59,9 @@ def read_geojson(name: str, files: MapFiles, options: MapOptions) -> MapReading:
     title, units = (data.get(key) for key in ("name", "units"))
     return read_outlines(
         Drawing(
-            name=title if isinstance(title, str) and title else stem,
+            name=printable(title, LONGEST_TITLE) if isinstance(title, str) and title else stem,
             outlines=outlines,
-            units=units if isinstance(units, str) and units else None,
+            units=printable(units, LONGEST_TITLE) if isinstance(units, str) and units else None,
             notes=notes,
         ),
         options,
@@ -190,14 +192,17 @@ def _outline(strokes: tuple[Stroke, ...], properties: dict[str, Any], own: Any) 
 
 
 def _number(value: Any) -> float | None:
-    good = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-    return float(value) if good else None
+    good = isinstance(value, int | float) and not isinstance(value, bool)
+    return float(value) if good and abs(value) <= sys.float_info.max else None
 
 
 def _like_degrees(outlines: list[Outline]) -> bool:
     """Tell whether numbers are within a degree of each other, far from the origin, and on the globe."""
     points = np.concatenate([outline.hull for outline in outlines])
-    extent = float(np.ptp(points, axis=0).max())
+    with np.errstate(over="ignore"):  # of coordinates that are left out later
+        extent = float(np.ptp(points, axis=0).max())
     near = np.abs(points).max(axis=0)
+    if extent >= 1.0:
+        return False
     middle = Point(points.mean(axis=0)).distance(Point(0.0, 0.0))
-    return bool(extent < 1.0 and near[0] <= 180.0 and near[1] <= 90.0 and middle > 10.0 * extent)
+    return bool(near[0] <= 180.0 and near[1] <= 90.0 and middle > 10.0 * extent)

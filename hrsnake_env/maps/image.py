@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageOps, UnidentifiedImageError
 from scipy import ndimage
 
-from hrsnake_env.errors import InputError
+from hrsnake_env.errors import InputError, printable
 from hrsnake_env.maps.raster import free_polygons
 from hrsnake_env.maps.reading import MapFiles, MapOptions, MapReading, scale_and_units
 from hrsnake_env.maps.simplify import simplified_inward
@@ -32,6 +32,9 @@ ISLAND = 16
 """Other parts of the free space with fewer pixels than this are left out: no arm would be there."""
 
 MAX_PIXELS, MAX_VERTICES = 64_000_000, 200_000
+
+MAX_CORNERS = 500_000
+"""Of the free pixels, before outlines become simpler: that takes a minute for noise of millions."""
 
 FORMATS = ("PPM", "PNG", "JPEG", "BMP", "TIFF", "GIF", "WEBP")
 
@@ -154,17 +157,10 @@ def decoded(data: bytes, name: str) -> Pixels:
         ) from None
     except InputError:
         raise
-    except (
-        OSError,
-        SyntaxError,
-        ValueError,
-        TypeError,
-        EOFError,
-        IndexError,
-        KeyError,
-        OverflowError,
-    ) as error:
-        raise InputError(f"Expected a whole image in '{name}', got a damaged one: {error}.") from None
+    except Exception as error:  # damaged images make the library raise whatever its parts do
+        raise InputError(
+            f"Expected a whole image in '{name}', got a damaged one: {printable(str(error), 200)}."
+        ) from None
 
 
 def _pixels(image: Image.Image, name: str) -> Pixels:
@@ -215,10 +211,15 @@ def reading_of(
         If no pixel is free, or the outlines have too many vertices.
     """
     notes = list(notes)
+    if min(free.shape) < 1:
+        raise InputError(f"Expected an image with pixels in '{name}', got none.")
     free, left_out = _without_islands(free)
     if left_out:
         notes.append(f"{left_out} islands of fewer than {ISLAND} free pixels were left out.")
     in_pixels = TOLERANCE if tolerance is None else tolerance / placement.pixel
+    corners = _n_corners(free)
+    if corners > MAX_CORNERS:
+        raise _too_many(MAX_CORNERS, corners, name)
     outlines = free_polygons(free)
     if outlines.is_empty:
         raise InputError(
@@ -229,10 +230,7 @@ def reading_of(
     simple, moved = simplified_inward(outlines, in_pixels)
     count = _n_vertices(simple)
     if count > MAX_VERTICES:
-        raise InputError(
-            f"Expected outlines of at most {MAX_VERTICES:,} vertices in '{name}', got {count:,}: remove "
-            f"specks from the image (a median filter does), make it smaller, or allow a larger tolerance."
-        )
+        raise _too_many(MAX_VERTICES, count, name)
     notes.append(f"{exact:,} vertices along the pixels became {count:,}.")
     turn, pixel = np.exp(1j * placement.yaw), placement.pixel
 
@@ -251,6 +249,21 @@ def reading_of(
         moved=moved * pixel,
         notes=tuple(notes),
     )
+
+
+def _too_many(most: int, count: int, name: str) -> InputError:
+    return InputError(
+        f"Expected outlines of at most {most:,} vertices in '{name}', got {count:,}: remove specks from the "
+        f"image (a median filter does), make it smaller, or allow a larger tolerance."
+    )
+
+
+def _n_corners(free: BoolArray) -> int:
+    """Return the number of corners along the pixels, before they are traced."""
+    padded = np.pad(free, 1)
+    differs = padded[:-1] ^ padded[1:]  # from the pixel below
+    touching = (padded[:-1, :-1] == padded[1:, 1:]) & differs[:, :-1] & differs[:, 1:]
+    return int((differs[:, :-1] ^ differs[:, 1:]).sum() + 2 * touching.sum())
 
 
 def _n_vertices(outlines: Any) -> int:

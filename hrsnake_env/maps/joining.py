@@ -12,8 +12,12 @@ from scipy.spatial import cKDTree
 from shapely.geometry import LineString, MultiLineString
 
 from hrsnake_env.arm import FloatArray
+from hrsnake_env.errors import InputError
 
 __all__ = ["joined"]
+
+MAX_PAIRS = 2_000_000
+"""Of ends of lines that may be joined: more of them take minutes."""
 
 
 def joined(lines: Sequence[FloatArray], gap: float) -> tuple[list[FloatArray], list[FloatArray]]:
@@ -56,11 +60,19 @@ def _snapped(ends: FloatArray, gap: float) -> FloatArray:
     """Move ends that are a gap apart at most to one of them, shape (n, 2)."""
     if not len(ends):
         return ends
-    pairs = cKDTree(ends).query_pairs(gap, output_type="ndarray")
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(ends), len(ends)))
-    _, group = connected_components(graph, directed=False)
-    _, first = np.unique(group, return_index=True)
-    return np.asarray(ends[first][group])
+    places, first_end, place_of = np.unique(ends, axis=0, return_index=True, return_inverse=True)
+    tree = cKDTree(places)
+    if tree.count_neighbors(tree, gap) > 2 * MAX_PAIRS + len(places):
+        raise InputError(
+            f"Expected at most {MAX_PAIRS:,} pairs of ends of lines nearer than {gap:.3g}, got more: give a "
+            f"smaller tolerance."
+        )
+    pairs = tree.query_pairs(gap, output_type="ndarray")
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(places), len(places)))
+    n_groups, group = connected_components(graph, directed=False)
+    first = np.full(n_groups, len(ends))
+    np.minimum.at(first, group, first_end)  # a group is where its first end is
+    return np.asarray(ends[first[group[place_of.ravel()]]])
 
 
 def _lines(geometry: shapely.Geometry) -> list[LineString]:

@@ -17,6 +17,7 @@ from hrsnake_env.errors import InputError
 __all__ = [
     "MAX_CROSSINGS",
     "Nesting",
+    "check_all_crossings",
     "check_crossings",
     "even_odd",
     "filled",
@@ -28,7 +29,10 @@ __all__ = [
 
 
 MAX_CROSSINGS = 20_000
-"""Of one outline with itself: more of them are a scribble, and take minutes."""
+"""Of one outline with itself, and of all together: more of them are a scribble, and take minutes."""
+
+MAX_PAIRS = 200_000
+"""Of outlines whose bounds meet."""
 
 N_PROBES = 500
 
@@ -44,16 +48,38 @@ def check_crossings(points: FloatArray) -> None:
     InputError
         If it does.
     """
-    n = len(points) - 1
-    if n * n < 2 * MAX_CROSSINGS:
-        return
-    sides = shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1))
-    probes = sides[:: max(1, n // N_PROBES)]
-    hits = len(STRtree(sides).query(probes, predicate="crosses")[0])
-    if hits * n / len(probes) > 2 * MAX_CROSSINGS:
+    if _n_crossings([points]) > MAX_CROSSINGS:
         raise InputError(
             f"Expected outlines that cross themselves at most {MAX_CROSSINGS:,} times, got a scribble."
         )
+
+
+def check_all_crossings(lines: Sequence[FloatArray]) -> None:
+    """Check that lines do not cross each other too often, as far as some of their sides tell.
+
+    Raises
+    ------
+    InputError
+        If they do.
+    """
+    if _n_crossings(lines) > MAX_CROSSINGS:
+        raise InputError(
+            f"Expected outlines that cross each other at most {MAX_CROSSINGS:,} times, got a scribble: "
+            f"ignore layers that are not needed."
+        )
+
+
+def _n_crossings(lines: Sequence[FloatArray]) -> float:
+    """Return how often sides of lines, shape (n, 2) each, cross, as far as some of them tell."""
+    n = sum(len(points) - 1 for points in lines)
+    if n * n < 2 * MAX_CROSSINGS:
+        return 0.0
+    sides = shapely.linestrings(
+        np.concatenate([np.stack([points[:-1], points[1:]], axis=1) for points in lines])
+    )
+    probes = sides[:: max(1, n // N_PROBES)]
+    hits = len(STRtree(sides).query(probes, predicate="crosses")[0])
+    return 0.5 * hits * n / len(probes)
 
 
 def polygons(geometry: shapely.Geometry) -> list[Polygon]:
@@ -187,6 +213,7 @@ def _relations(areas: np.ndarray, gap: float) -> tuple[np.ndarray, ...]:
     What sticks out of another by no more than the gap lies in it.
     """
     tree = STRtree(areas)
+    _check_pairs(tree, areas)
     outer, inner = tree.query(areas, predicate="covers")
     a, b = tree.query(areas, predicate="overlaps")
     a, b = a[a < b], b[a < b]
@@ -215,6 +242,16 @@ def _relations(areas: np.ndarray, gap: float) -> tuple[np.ndarray, ...]:
     a, b = a[deep], b[deep]
     swap = size[a] > size[b]
     return inner[real], outer[real], np.where(swap, b, a), np.where(swap, a, b), twin
+
+
+def _check_pairs(tree: STRtree, areas: np.ndarray) -> None:
+    n_pairs = 0
+    for start in range(0, len(areas), 100):
+        n_pairs += len(tree.query(areas[start : start + 100])[0])
+        if n_pairs > 2 * MAX_PAIRS:
+            raise InputError(
+                f"Expected at most {MAX_PAIRS:,} pairs of outlines that lie in or over each other, got more."
+            )
 
 
 def _within(areas: np.ndarray, others: np.ndarray, gap: float) -> np.ndarray:

@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 from shapely.geometry import MultiPolygon, Point, Polygon
 
-from hrsnake_env.errors import InputError
+from hrsnake_env.errors import InputError, brief, printable
 from hrsnake_env.maze import Maze
 
 __all__ = ["METRES", "MapFiles", "MapOptions", "MapReading", "converts", "files_beside", "scale_and_units"]
@@ -32,6 +32,9 @@ METRES = {
 MAX_BYTES = 512_000_000
 """Of a file."""
 
+LONGEST_NAME, LONGEST_NOTE = 200, 1000
+"""Characters of what is shown of a map."""
+
 GOAL_SHARE = 0.25
 """Radius of a goal that none was given for, as a share of its distance to the nearest wall."""
 
@@ -47,7 +50,10 @@ def files_beside(path: Path) -> MapFiles:
         try:
             if target.exists() and not target.is_file():
                 raise InputError(f"Expected a file at '{target}', got a folder or a device.")
-            if target.stat().st_size > MAX_BYTES:
+            size = target.stat().st_size
+            if size == 0:  # as devices in disguise have, which would be waited for
+                raise InputError(f"Expected a map at '{target}', got an empty file.")
+            if size > MAX_BYTES:
                 raise InputError(f"Expected a file of at most {MAX_BYTES:,} bytes at '{target}', got more.")
             return target.read_bytes()
         except FileNotFoundError:
@@ -55,7 +61,7 @@ def files_beside(path: Path) -> MapFiles:
         except ValueError as error:
             if isinstance(error, InputError):
                 raise
-            raise InputError(f"Expected the name of a file, got {name!r}.") from None
+            raise InputError(f"Expected the name of a file, got {brief(name)}.") from None
         except OSError as error:
             raise InputError(f"Expected a readable file at '{target}', got: {error.strerror}.") from None
 
@@ -204,7 +210,16 @@ class MapReading:
     goal_radius: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "layers", MappingProxyType(dict(self.layers)))
+        if not (np.isfinite(self.free_space.bounds).all() and self.free_space.is_valid):
+            raise InputError(
+                f"Expected a free space whose corners numbers can tell apart, in map '{self.name}', got one "
+                f"that is too small for where it is, or too large: give another scale."
+            )
+        texts = {name: printable(getattr(self, name), LONGEST_NAME) for name in ("name", "units")}
+        notes = tuple(printable(note, LONGEST_NOTE) for note in self.notes)
+        layers = {printable(layer, LONGEST_NAME): role for layer, role in self.layers.items()}
+        for name, value in (*texts.items(), ("notes", notes), ("layers", MappingProxyType(layers))):
+            object.__setattr__(self, name, value)
 
     @property
     def parts(self) -> list[Polygon]:

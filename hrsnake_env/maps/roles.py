@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hrsnake_env.errors import InputError
+from hrsnake_env.errors import InputError, brief, printable
 from hrsnake_env.maps.drawing import Outline
 from hrsnake_env.maps.reading import MapOptions
 
@@ -23,7 +23,8 @@ SPEAKING = {
 }
 """Words of a name that say what its outlines are: `A-WALL`, `Free space`, `goal_1`."""
 
-SHOWN_NAMES = 20
+SHOWN_NAMES, LONGEST_LIST = 20, 200
+"""Of the names that there are, and characters of them together."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -83,9 +84,8 @@ def _known(name: str, names: dict[str, str], colours: set[str]) -> str:
         return str(colour)
     shown = [*sorted(names.values()), *sorted(colours)]
     more = f" and {len(shown) - SHOWN_NAMES} more" if len(shown) > SHOWN_NAMES else ""
-    raise InputError(
-        f"Unknown layer or colour {name!r}. Available: {', '.join(shown[:SHOWN_NAMES]) or 'none'}{more}."
-    )
+    listed = printable(", ".join(shown[:SHOWN_NAMES]), LONGEST_LIST) or "none"
+    raise InputError(f"Unknown layer or colour {brief(name)}. Available: {listed}{more}.")
 
 
 def _colour(name: str) -> str | None:

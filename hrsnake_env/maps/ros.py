@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import reprlib
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hrsnake_env.errors import InputError
+from hrsnake_env.errors import InputError, brief
 from hrsnake_env.maps.image import Pixels, Placement, decoded, reading_of
 from hrsnake_env.maps.reading import MapFiles, MapOptions, MapReading, scale_and_units
 
@@ -18,8 +17,14 @@ __all__ = ["read_ros"]
 
 MODES = ("trinary", "scale", "raw")
 
-MAX_BYTES = 100_000
+MAX_BYTES = 20_000
 """Of the YAML file, which has ten lines."""
+
+MAX_DEPTH = 10
+"""Brackets within brackets."""
+
+LONGEST_NAME = 300
+"""Characters of the path of an image."""
 
 UNSEEN = 205
 """The grey in which map savers write what nobody has seen."""
@@ -123,14 +128,12 @@ def _warnings(pixels: Pixels, header: _Header, options: MapOptions) -> list[str]
 def _header(data: bytes, name: str) -> _Header:
     fields = _fields(data, name)
     image = fields.get("image")
-    if not isinstance(image, str) or not image:
-        raise InputError(f"Expected the name of an image as 'image' in '{name}', got {reprlib.repr(image)}.")
+    if not isinstance(image, str) or not 0 < len(image) <= LONGEST_NAME:
+        raise InputError(f"Expected the name of an image as 'image' in '{name}', got {brief(image)}.")
     origin = fields.get("origin")
     origin = [_as_written(value) for value in origin] if isinstance(origin, list) else origin
     if not isinstance(origin, list) or len(origin) != 3 or not all(_is_number(value) for value in origin):
-        raise InputError(
-            f"Expected 'origin' as three numbers [x, y, yaw] in '{name}', got {reprlib.repr(origin)}."
-        )
+        raise InputError(f"Expected 'origin' as three numbers [x, y, yaw] in '{name}', got {brief(origin)}.")
     resolution = _number(fields, "resolution", name)
     if resolution <= 0.0:
         raise InputError(f"Expected a positive 'resolution' in '{name}', got {resolution:g}.")
@@ -142,9 +145,9 @@ def _header(data: bytes, name: str) -> _Header:
         )
     negate, mode = fields.get("negate", 0), fields.get("mode", "trinary")
     if not isinstance(negate, bool | int):
-        raise InputError(f"Expected 'negate' as 0 or 1 in '{name}', got {reprlib.repr(negate)}.")
+        raise InputError(f"Expected 'negate' as 0 or 1 in '{name}', got {brief(negate)}.")
     if mode not in MODES:
-        raise InputError(f"Unknown mode {reprlib.repr(mode)} in '{name}'. Available: {', '.join(MODES)}.")
+        raise InputError(f"Unknown mode {brief(mode)} in '{name}'. Available: {', '.join(MODES)}.")
     return _Header(
         image=image,
         resolution=resolution,
@@ -164,8 +167,11 @@ def _fields(data: bytes, name: str) -> dict[Any, Any]:
     if len(data) > MAX_BYTES:
         raise InputError(f"Expected the YAML file of a ROS map in '{name}', got {len(data):,} bytes.")
     try:
+        _check_plain(yaml, data, name)
         fields = yaml.safe_load(data)
-    except (yaml.YAMLError, ValueError, OverflowError, RecursionError, TypeError) as error:
+    except InputError:
+        raise
+    except Exception as error:  # the library raises whatever its parts do: of `!!bool x` a KeyError
         place = getattr(error, "problem_mark", None)
         where = "" if place is None else f" in line {place.line + 1}"
         raise InputError(f"Expected YAML in '{name}', got something else{where}.") from None
@@ -174,6 +180,21 @@ def _fields(data: bytes, name: str) -> dict[Any, Any]:
             f"Expected 'image: ...', 'resolution: ...' and so on in '{name}', got no such lines."
         )
     return fields
+
+
+def _check_plain(yaml: Any, data: bytes, name: str) -> None:
+    """Refuse what a few bytes of YAML make endless: aliases, and brackets in brackets."""
+    depth = 0
+    for token in yaml.scan(data):
+        kind = type(token).__name__
+        if kind == "AliasToken":
+            raise InputError(
+                f"Expected plain lines of YAML in '{name}', got an alias (*), which maps do not have."
+            )
+        depth += kind in ("FlowSequenceStartToken", "FlowMappingStartToken")
+        depth -= kind in ("FlowSequenceEndToken", "FlowMappingEndToken")
+        if depth > MAX_DEPTH:
+            raise InputError(f"Expected plain lines of YAML in '{name}', got brackets {MAX_DEPTH} deep.")
 
 
 def _as_written(value: Any) -> Any:
@@ -193,5 +214,5 @@ def _is_number(value: Any) -> bool:
 def _number(fields: dict[Any, Any], key: str, name: str) -> float:
     value = _as_written(fields.get(key))
     if not _is_number(value):
-        raise InputError(f"Expected a number as '{key}' in '{name}', got {reprlib.repr(value)}.")
+        raise InputError(f"Expected a number as '{key}' in '{name}', got {brief(value)}.")
     return float(value)

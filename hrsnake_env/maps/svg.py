@@ -6,6 +6,7 @@ import gzip
 import io
 import math
 import re
+import zlib
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import PurePath
@@ -15,7 +16,7 @@ from xml.parsers import expat
 
 import numpy as np
 
-from hrsnake_env.errors import InputError
+from hrsnake_env.errors import InputError, printable
 from hrsnake_env.maps.drawing import Drawing, Outline, Stroke, counted
 from hrsnake_env.maps.flatten import MAX_POINTS, Arc, Bezier, Line, Piece
 from hrsnake_env.maps.outlines import read_outlines
@@ -23,17 +24,21 @@ from hrsnake_env.maps.reading import MapFiles, MapOptions, MapReading
 
 __all__ = ["read_svg"]
 
-MAX_BYTES = 128 * 2**20
+MAX_BYTES = 32 * 2**20
 MAX_DEPTH = 100
 """Groups within groups; the library walks them by recursion."""
 
 MAX_ELEMENTS = 200_000
 """Elements after all uses are written out."""
 
+MAX_NUMBERS = 1_000_000
+"""In paths and points: the library takes a minute for more."""
+
 NAMESPACE = "{http://www.w3.org/2000/svg}"
 LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 LINKS = ("href", "{http://www.w3.org/1999/xlink}href")
 LENGTH = re.compile(r"\s*([0-9.]+(?:[eE][-+]?\d+)?)\s*(mm|cm|in|pt|pc|px|q|)\s*", re.IGNORECASE)
+NUMBER = re.compile(r"[0-9]+")
 IN_MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6, "q": 0.25}
 
 SAID = ("text", "image", "foreignObject")
@@ -63,6 +68,7 @@ def read_svg(name: str, files: MapFiles, options: MapOptions) -> MapReading:
         raise InputError("Expected svgelements for SVG drawings: pip install 'hrsnake[maps]'.") from None
     root = _checked_tree(_plain(files(name), name), name)
     to_page, height, units = _page(root, name)
+    _check_numbers(root, name)
     notes = _prepare(root)
     _check_uses(root, name)
     for key in ("width", "height"):
@@ -71,10 +77,12 @@ def read_svg(name: str, files: MapFiles, options: MapOptions) -> MapReading:
         picture = SVG.parse(io.BytesIO(ElementTree.tostring(root)), reify=False)
         with np.errstate(all="ignore"):  # what is not finite is left out later, and said
             outlines = list(_outlines(picture, to_page, height))
-    except (ValueError, TypeError, IndexError, KeyError, AttributeError, ZeroDivisionError, OverflowError):
-        raise InputError(f"Expected shapes that can be read in '{name}', got broken ones.") from None
+    except InputError:
+        raise
     except RecursionError:
         raise InputError(f"Expected groups at most {MAX_DEPTH} deep in '{name}', got more.") from None
+    except Exception:  # broken shapes make the library raise whatever its parts do
+        raise InputError(f"Expected shapes that can be read in '{name}', got broken ones.") from None
     notes.insert(0, f"SVG drawing of {counted(len(outlines), 'shape')}.")
     return read_outlines(
         Drawing(name=PurePath(name).stem, outlines=outlines, units=units, notes=notes), options
@@ -89,7 +97,7 @@ def _plain(data: bytes, name: str) -> bytes:
         try:
             with gzip.open(io.BytesIO(data)) as packed:
                 data = packed.read(MAX_BYTES + 1)
-        except (OSError, EOFError):
+        except (OSError, EOFError, zlib.error):
             raise InputError(f"Expected a whole compressed SVG in '{name}', got a broken one.") from None
     if len(data) > MAX_BYTES:
         raise InputError(f"Expected at most {MAX_BYTES >> 20} MiB in '{name}', got more.")
@@ -124,10 +132,18 @@ def _checked_tree(data: bytes, name: str) -> ElementTree.Element:
     except (expat.ExpatError, ElementTree.ParseError, LookupError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"Expected an SVG drawing in '{name}', got broken XML: {error}.") from None
+        raise InputError(
+            f"Expected an SVG drawing in '{name}', got broken XML: {printable(str(error), 200)}."
+        ) from None
     if _tag(root) != "svg":
         raise InputError(f"Expected an SVG drawing in '{name}', got <{_tag(root)}>.")
     return root
+
+
+def _check_numbers(root: ElementTree.Element, name: str) -> None:
+    n = sum(len(NUMBER.findall(element.get(key, ""))) for element in root.iter() for key in ("d", "points"))
+    if n > MAX_NUMBERS:
+        raise InputError(f"Expected at most {MAX_NUMBERS:,} numbers in paths in '{name}', got {n:,}.")
 
 
 def _tag(element: ElementTree.Element) -> str:
@@ -183,8 +199,21 @@ def _prepare(root: ElementTree.Element) -> list[str]:
                 defs = ElementTree.Element(f"{NAMESPACE}defs")
                 defs.append(child)
                 parent[list(parent).index(child)] = defs
+            elif tag == "style":
+                child.text = _rules(child.text or "")
     said = [counted(out[what], what) for what in (*SAID, "hidden element") if out[what]]
     return [f"Left out: {', '.join(said)}."] if said else []
+
+
+def _rules(text: str) -> str:
+    """Return the rules of a style sheet: what is not closed takes the library the square of its length."""
+    text = re.sub(r"/\*.*?(\*/|\Z)", "", text, flags=re.DOTALL)
+    rules = (rule.partition("{") for rule in text.split("}")[:-1])
+    return "".join(
+        f"{who.strip()}{{{what.strip()}}}\n"
+        for who, _, what in rules
+        if who.strip() and what.strip() and "{" not in what
+    )
 
 
 def _is_hidden(element: ElementTree.Element) -> bool:

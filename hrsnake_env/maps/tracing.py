@@ -15,7 +15,7 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.maps.drawing import Outline, Stroke, counted
 from hrsnake_env.maps.flatten import MAX_POINTS, Trace, flattened
 from hrsnake_env.maps.joining import joined
-from hrsnake_env.maps.nesting import check_crossings
+from hrsnake_env.maps.nesting import check_all_crossings, check_crossings
 
 __all__ = ["OpenLine", "Ring", "Traced", "traced"]
 
@@ -103,6 +103,7 @@ def traced(
     found = Traced()
     loose: dict[tuple[str | None, str, str], list[FloatArray]] = {}
     left: Counter[str] = Counter()
+    traces: list[Trace] = []
     n_points = 0
     for i, (outline, role, key) in enumerate(zip(outlines, roles, keys, strict=True)):
         if role not in (None, "free", "walls"):
@@ -121,12 +122,15 @@ def traced(
                 left["place or shape of no size"] += 1
                 continue
             check_crossings(trace.points)
-            found.take(trace)
+            traces.append(trace)
             if _encloses(stroke, trace.points, gap):
                 ring = Ring(points=trace.points, role=role, key=key, outline=i, nonzero=outline.nonzero)
                 found.rings.append(ring)
             else:
                 loose.setdefault((role, key, outline.layer), []).append(trace.points)
+    check_all_crossings([ring.points for ring in found.rings])
+    for trace in traces:
+        found.take(trace)
     for (role, key, _), lines in loose.items():
         _join(found, role, key, lines, gap, same)
     found.notes += [f"{counted(n, what)} left out." for what, n in left.items()]
