@@ -71,7 +71,7 @@ class RodPath:
     length : float
         Of the rod.
     tails : array-like, shape (n, 2)
-        From the base, in maze units.
+        From the base, in maze units; of a rod that is at the goal before it is out, behind the base.
     headings : array-like, shape (n,)
         From tail to tip, in rad, without jumps of 2 pi.
     """
@@ -151,8 +151,8 @@ def rod_bound(
 ) -> RodBound:
     """Compute the length of the longest rod that passes from the base to the goal.
 
-    The rod starts with its tail at the base, along the base heading; it may touch walls; at the end its tip
-    is within the goal radius of the goal.
+    The rod comes out of the feeder, along the base heading; it may touch walls; at the end its tip is within
+    the goal radius of the goal. If that is so before all of it is out, only the feeder limits it.
 
     Parameters
     ----------
@@ -271,6 +271,7 @@ class _Questions:
     def __init__(self, maze: Maze) -> None:
         self.maze = maze
         self.straight = _straight_way(maze)
+        self.emerging = _way_of_a_tip(maze)
         self._first = _first_triangles(maze)
         self._work = _work_space(0)
 
@@ -278,6 +279,10 @@ class _Questions:
         """Decide whether a rod passes; start from the first triangles and halve those that are in doubt."""
         if length > self.straight:
             return RodVerdict(passes=Passage.NO, length=length)
+        if self.emerging <= min(length, self.straight):
+            return RodVerdict(
+                passes=Passage.YES, length=length, path=_path_of_a_tip(self.maze, length, self.emerging)
+            )
         task = _task(self.maze, self._first.walls, length, resolution)
         space, every = _copy(self._first), True
         while True:
@@ -321,6 +326,24 @@ def _straight_way(maze: Maze) -> float:
     ray = LineString([(x, y), (x + reach * math.cos(heading), y + reach * math.sin(heading))])
     parts = shapely.get_parts(shapely.line_merge(ray.intersection(maze.free_space)))
     return float(min(parts, key=Point(x, y).distance).length)
+
+
+def _way_of_a_tip(maze: Maze) -> float:
+    """Return how far along the base heading a tip gets to the goal; infinite if it passes the goal by."""
+    way = complex(*(maze.goal - maze.base_pose[:2])) * np.exp(-1j * maze.base_pose[2])
+    if abs(way) <= maze.goal_radius:
+        return 0.0
+    if way.real < 0.0 or abs(way.imag) > maze.goal_radius:
+        return math.inf
+    return float(way.real - math.sqrt(maze.goal_radius**2 - way.imag**2))
+
+
+def _path_of_a_tip(maze: Maze, length: float, way: float) -> RodPath:
+    """Return the motion of a rod that comes out of the feeder by `way`."""
+    x, y, heading = maze.base_pose
+    behind = np.array([length, length - way])
+    tails = np.stack([x - behind * math.cos(heading), y - behind * math.sin(heading)], axis=1)
+    return RodPath(length=length, tails=tails, headings=np.full(2, heading))
 
 
 def _first_triangles(maze: Maze) -> RodSpace:

@@ -12,12 +12,14 @@ from scipy.optimize import minimize_scalar
 from shapely.affinity import rotate, scale
 from shapely.geometry import LineString, Polygon, box
 
+from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import fig19
 from planners.kernels.rod import free_directions
 from planners.kernels.rod_search import sweep_is_free
 from planners.kernels.rod_space import GAPS, SLACK, possible_gaps
+from planners.planning import plan
 from planners.rod_bound import Passage, _first_triangles, rod_bound, rod_passes
 
 ACCURACY = 0.005
@@ -314,3 +316,24 @@ def test_a_small_maze_is_decided_in_plain_python_too():
     maze = maze_of(box(0, 0, 10, 40).union(box(0, 30, 40, 40)), (5, 1, math.pi / 2), (35, 35), 2.0)
     assert rod_passes(maze, 20.0).passes is Passage.YES
     assert rod_passes(maze, 35.0).passes is Passage.NO
+
+
+@pytest.mark.parametrize("heading", [0.0, 2.0])
+@pytest.mark.parametrize(("goal", "radius"), [((2.5, 0.0), 0.1), ((1.0, 0.2), 0.3), ((0.05, 0.0), 0.1)])
+def test_a_goal_that_the_tip_gets_to_from_the_feeder_lets_the_feeder_alone_limit_the_rod(
+    goal, radius, heading
+):
+    room = rotate(box(-0.05, -0.5, 3.0, 0.5), heading, origin=(0, 0), use_radians=True)
+    turned = complex(*goal) * np.exp(1j * heading)
+    maze = Maze(
+        name="room",
+        free_space=room,
+        base_pose=np.array([0.0, 0.0, heading]),
+        goal=np.array([turned.real, turned.imag]),
+        goal_radius=radius,
+    )
+    bound = rod_bound(maze)
+    assert bound.upper == pytest.approx(3.0) and bound.limited_by == "feeder" and bound.lower > 2.98
+    assert plan(maze, ArmSpec(link_length=2.9)).solved
+    np.testing.assert_allclose(bound.path.tips[0], 0.0, atol=1e-9)
+    assert np.hypot(*(bound.path.tips[-1] - maze.goal)) <= radius * (1 + 1e-9)
