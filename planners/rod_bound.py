@@ -331,8 +331,6 @@ def _straight_way(maze: Maze) -> float:
 def _way_of_a_tip(maze: Maze) -> float:
     """Return how far along the base heading a tip gets to the goal; infinite if it passes the goal by."""
     way = complex(*(maze.goal - maze.base_pose[:2])) * np.exp(-1j * maze.base_pose[2])
-    if abs(way) <= maze.goal_radius:
-        return 0.0
     if way.real < 0.0 or abs(way.imag) > maze.goal_radius:
         return math.inf
     return float(way.real - math.sqrt(maze.goal_radius**2 - way.imag**2))

@@ -9,7 +9,7 @@ PACKAGES = ("hrsnake_env", "planners")
 CALLERS = ("tests", "benchmarks/trust")
 
 THROUGH_PYTHON = frozenset({"planners.kernels.sweep.grow_track"})
-"""Public kernels whose results tests look at where Python has them: `grow_track` in `planners.sweep_track.grow`."""
+"""Public kernels that tests call through `planners.sweep_track.grow`."""
 
 
 @cache
