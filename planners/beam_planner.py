@@ -24,7 +24,6 @@ the link. `AS_PRINTED` leaves it out; `CLAMPED` has it. Which rules are followed
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +33,7 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners.beams import Beams
 from planners.checking import Late
+from planners.clock import now
 from planners.kernels import beam_arm as kernel
 from planners.kernels.beam_arm import (
     choose,
@@ -185,9 +185,9 @@ def plan_beam(query: Query, rules: Rules = CLAMPED) -> Candidate:
     if geometry is None:
         return query.no_path()
     query.tell("plan", 0.2)
-    clock = [time.perf_counter()]
+    clock = [now()]
     run = run_beam(geometry, query.arm, rules, record=False, deadline=query.deadline)
-    clock.append(time.perf_counter())
+    clock.append(now())
     query.tell("plan", 1.0)
     if run.ending != kernel.GOAL:
         return Candidate(
@@ -201,7 +201,7 @@ def plan_beam(query: Query, rules: Rules = CLAMPED) -> Candidate:
             timings={**geometry.timings, "plan": clock[1] - clock[0]},
         )
     motion = run.motion(query.maze)
-    clock.append(time.perf_counter())
+    clock.append(now())
     stages = dict(zip(("plan", "poses"), np.diff(clock).tolist(), strict=True))
     return Candidate(status=PlanningStatus.SOLVED, motion=motion, timings={**geometry.timings, **stages})
 
@@ -344,7 +344,7 @@ def run_beam(
     record : bool
         Whether what each link does is recorded.
     deadline : float
-        On the clock of `time.perf_counter`.
+        On the clock of `planners.clock.now`.
 
     Raises
     ------
@@ -354,7 +354,7 @@ def run_beam(
     fed = FedArm(geometry, arm, rules, record=record)
     ending, link = fed.feed(AT_A_TIME)
     while ending == kernel.FULL:
-        if time.perf_counter() > deadline:
+        if now() > deadline:
             raise Late
         ending, link = fed.feed(AT_A_TIME)
     n = fed.n_poses

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from typing import Generic
 
+from planners.clock import now
 from planners.problem import AnyMotion, Progress, ValidationReport
 
 __all__ = ["Checker", "Late"]
@@ -23,7 +23,7 @@ class Checker(Generic[AnyMotion]):
     validate : callable
         Takes a motion and a progress.
     deadline : float
-        On the clock of `time.perf_counter`.
+        On the clock of `planners.clock.now`.
     progress : callable or None
         Called with stage and share done.
 
@@ -60,18 +60,18 @@ class Checker(Generic[AnyMotion]):
         if self.last is not None and self.last[0] is motion:
             return self.last[1]
         self.asked = motion
-        start = time.perf_counter()
+        start = now()
         try:
             report = self.validate(motion, self._tell)
         finally:
-            self.seconds += time.perf_counter() - start
+            self.seconds += now() - start
         self.last = (motion, report)
         if not report.valid:
             self.refused.append(motion)
         return report
 
     def _tell(self, stage: str, share: float) -> None:
-        if time.perf_counter() > self.deadline:
+        if now() > self.deadline:
             raise Late
         if self.progress is not None:
             self.progress(stage, share)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass
 
 import numpy as np
 
+from planners.clock import now
 from planners.kernels import feeding as kernel
 from planners.kernels.feeding_sweep import Sweep, sweep_chords
 from planners.kernels.types import FloatArray
@@ -88,7 +88,7 @@ def feed(
         Segments, in maze units, in the plane alone; if given, feeding ends at the first pose that meets one
         of them or itself. That is before the first pose if chords that end at points of the track do.
     deadline : float
-        When to stop, on the clock of `time.perf_counter`.
+        When to stop, on the clock of `planners.clock.now`.
     """
     # About the base: far from the origin, rounding would be more than links are exact to.
     base, heading = kernel.feeder_axis(base_pose)
@@ -111,7 +111,7 @@ def feed(
     state, segments = np.zeros(5), np.zeros((2, n_links + 1), dtype=np.int64)
     places, n, ending = np.zeros((2, n_links + 1)), 0, kernel.FULL
     while ending == kernel.FULL and n < most:
-        if n > 0 and time.perf_counter() >= deadline:
+        if n > 0 and now() >= deadline:
             ending = LATE
             break
         if n == room:

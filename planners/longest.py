@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 import os
-import time
 from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
@@ -20,6 +19,7 @@ from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import locked
 from hrsnake_env.maze import Maze
+from planners.clock import now
 from planners.length_trials import LengthTrial, TrialFile, digest_of
 from planners.planning import PLANNERS, plan
 from planners.problem import Motion, PlanningStatus, Progress
@@ -220,7 +220,7 @@ def longest_link(
 def _searched(question: _Question, file: TrialFile, progress: Progress | None) -> LongestLink:
     """Search on from what a file of trials knows."""
     if file.bound is None:
-        deadline = time.perf_counter() + BOUND_BUDGET
+        deadline = now() + BOUND_BUDGET
         finer = min(question.accuracy, ACCURACY)  # a coarse grid is no reason for a coarse index
         file.bound = rod_bound(
             question.maze, question.link_radius, accuracy=finer, deadline=deadline, progress=progress
@@ -347,7 +347,7 @@ class _Search:
         return 0.5 * (best + above)
 
     def _try(self, length: float) -> None:
-        ask, start = self.question, time.perf_counter()
+        ask, start = self.question, now()
         if length > self.bound.upper:
             limit = f"{self.bound.upper:.5g} {ask.maze.units}"
             why = f"No rod longer than {limit} passes: this is proved."
@@ -359,7 +359,7 @@ class _Search:
         except InputError as error:  # the link is too short for its radius, or does not leave the feeder
             self._rule_out(length, PlanningStatus.NO_PATH, str(error))
             return
-        seconds = time.perf_counter() - start
+        seconds = now() - start
         self.file.add(LengthTrial.from_result(length, result, seconds, ask.time_budget), result.motion)
 
     def _rule_out(self, length: float, status: PlanningStatus, why: str) -> None:

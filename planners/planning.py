@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -17,6 +16,7 @@ from planners.afar import moved_report, moved_result, seen_from_base
 from planners.baselines import BASELINES
 from planners.beam_planner import plan_as_printed, plan_beam
 from planners.checking import Checker, Late
+from planners.clock import now
 from planners.obstruction import wall_nearest_to
 from planners.portfolio import Question, first_questions, further_questions
 from planners.problem import (
@@ -121,7 +121,7 @@ def plan(
         )
     if warm_start is not None:
         _check_warm_start(warm_start, maze, arm)
-    deadline = time.perf_counter() + time_budget
+    deadline = now() + time_budget
     bare = dataclasses.replace(arm, n_links=None)  # planners give as many links as the motion needs
     seen, origin = seen_from_base(maze, arm.link_length)
     if warm_start is not None and origin is not None:
@@ -188,13 +188,13 @@ class _Hearing:
     def first_solved(self, questions: Iterator[Question]) -> PlanningResult | None:
         """Return the first valid answer."""
         for question in questions:
-            start = time.perf_counter()
+            start = now()
             try:
                 result = _answer(question, self.checker)
             except InputError as error:  # another planner may need fewer links
                 self.shortage = self.shortage or error
                 continue
-            seconds = time.perf_counter() - start
+            seconds = now() - start
             self.attempts.append(
                 Attempt(planner=question.planner, route=question.route, status=result.status, seconds=seconds)
             )

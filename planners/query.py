@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.maze import Maze
+from planners.clock import now
 from planners.kernels.types import FloatArray
 from planners.problem import Candidate, Failure, Motion, PlanningStatus, Progress, ValidationReport
 from planners.routes import routes
@@ -28,7 +28,7 @@ class Query:
     arm : ArmSpec
         The arm; planners do not use `n_links`, they give as many links as the motion needs.
     deadline : float
-        When to stop, on the clock of `time.perf_counter`.
+        When to stop, on the clock of `planners.clock.now`.
     warm_start : Motion or None
         A motion of the same links in a similar maze, to start from.
     route : array, shape (n, 2), or None
@@ -88,7 +88,7 @@ class Query:
     @property
     def late(self) -> bool:
         """Whether the deadline has passed."""
-        return time.perf_counter() >= self.deadline
+        return now() >= self.deadline
 
     def no_path(self) -> Candidate:
         """Return the outcome where there is nothing to survey."""

@@ -10,7 +10,6 @@ possible ones is a proof that there is none; a way with doubts says which triang
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -20,6 +19,7 @@ from shapely.geometry import LineString, Point
 
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
+from planners.clock import now
 from planners.inset import inset_maze
 from planners.kernels.rod import free_directions
 from planners.kernels.rod_search import BASE, FIRST, GOAL, PER_TRIANGLE, Frontier, Task, search
@@ -163,7 +163,7 @@ def rod_bound(
     accuracy : float
         (upper - lower) / upper to be reached, in (0, 1).
     deadline : float
-        Reading of `time.perf_counter` after which the best interval so far is returned.
+        Reading of `planners.clock.now` after which the best interval so far is returned.
     progress : callable, optional
         Called with stage and share done.
 
@@ -189,7 +189,7 @@ def rod_bound(
         return RodBound(lower=0.0, upper=0.0, limited_by="maze", proven=True, path=None)
     questions = _Questions(inset)
     lower, upper, best, part = 0.0, questions.straight, None, PART
-    while upper - lower > accuracy * upper and time.perf_counter() < deadline:
+    while upper - lower > accuracy * upper and now() < deadline:
         if progress is not None:
             progress("rod bound", _share((upper - lower) / upper, accuracy))
         for fraction in FRACTIONS:
@@ -235,7 +235,7 @@ def rod_passes(
     resolution : float
         Triangles of tails smaller than this, in rod lengths, are not halved any more.
     deadline : float
-        Reading of `time.perf_counter` after which it is undecided.
+        Reading of `planners.clock.now` after which it is undecided.
 
     Raises
     ------
@@ -294,7 +294,7 @@ class _Questions:
             if not ((nodes >= FIRST) & ((nodes - FIRST) % PER_TRIANGLE < GAPS)).any():
                 passes = Passage.YES
                 break
-            if not doubts.size or time.perf_counter() > deadline:
+            if not doubts.size or now() > deadline:
                 passes = Passage.UNDECIDED
                 break
             space, every = _halved(space, doubts), False

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
 
 from hrsnake_env.maze import Maze
 from planners.beams import Beams, cast_beams
+from planners.clock import now
 from planners.corners import Corner, critical_corners, semi_critical_corners
 from planners.inset import inset_maze
 from planners.kernels.types import FloatArray
@@ -59,25 +59,25 @@ def survey(maze: Maze, link_radius: float = 0.0, route: FloatArray | None = None
     geometry : Geometry or None
         None if no path was found.
     """
-    clock = [time.perf_counter()]
+    clock = [now()]
     inset = inset_maze(maze, link_radius)
     if inset is None:
         return None
     width = passage_width(inset)
     if route is None:
         potential = laplace_potential(inset, width=width)
-        clock.append(time.perf_counter())
+        clock.append(now())
         path = global_path(inset, potential, width)
     else:
         clock.append(clock[0])
         path = path_along(route, width)
-    clock.append(time.perf_counter())
+    clock.append(now())
     if path is None:
         return None
     beams = cast_beams(inset, path)
     corners = critical_corners(path, beams)
     semi_critical = semi_critical_corners(path, beams, corners)
-    clock.append(time.perf_counter())
+    clock.append(now())
     return Geometry(
         maze=inset,
         path=path,

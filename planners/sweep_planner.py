@@ -12,11 +12,11 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-import time
 from collections.abc import Iterator
 
 import numpy as np
 
+from planners.clock import now
 from planners.corners import critical_corners
 from planners.kernels import sweep as kernel
 from planners.obstruction import least_depth, wall_nearest_to
@@ -197,7 +197,7 @@ class _Search:
 
     def _grow(self, fineness: Fineness, chosen: list[int], earlier: Track | None) -> Track:
         """Grow a track, from where its aim begins to differ from that of an earlier one."""
-        clock = time.perf_counter()
+        clock = now()
         aim = aim_line(
             self.geometry,
             self.corners,
@@ -208,7 +208,7 @@ class _Search:
         self.left, self.work = self.left - 1, self.work - (track.n - track.resumed)
         if self.best is None or track.index > self.best.index:
             self.best = track
-        self.seconds["plan"] += time.perf_counter() - clock
+        self.seconds["plan"] += now() - clock
         self.query.tell("plan", self.share + (1.0 - self.left / MAX_ATTEMPTS) / len(FINENESSES))
         return track
 
@@ -217,10 +217,10 @@ class _Search:
 
         If there is no time to make it, there is no motion then.
         """
-        clock = time.perf_counter()
+        clock = now()
         query = self.query
         self.motion = motion_of(track, query.arm.link_length, query.maze, query.deadline)
-        self.seconds["poses"] += time.perf_counter() - clock
+        self.seconds["poses"] += now() - clock
         if self.motion is None:
             return False
         self.report = self.query.check(self.motion)

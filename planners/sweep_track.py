@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import time
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from hrsnake_env.arm import ArmSpec, configuration_from_joints
 from hrsnake_env.maze import Maze
+from planners.clock import now
 from planners.corners import Corner
 from planners.kernels import sweep as kernel
 from planners.kernels.types import FloatArray, IntArray
@@ -174,7 +174,7 @@ def grow(
     earlier : Track, optional
         Of the same fineness, with another aim: the new track is the same up to where the aims differ.
     deadline : float
-        When to stop, on the clock of `time.perf_counter`.
+        When to stop, on the clock of `planners.clock.now`.
     """
     path, length = geometry.path, float(arm.link_length)
     n_lengths = path.length / length
@@ -197,7 +197,7 @@ def grow(
     )
     resumed = 0 if earlier is None else _common(track, earlier, path.s, length)
     n, ending = resumed, kernel.PAUSED
-    while ending == kernel.PAUSED and (n == resumed or time.perf_counter() < deadline):
+    while ending == kernel.PAUSED and (n == resumed or now() < deadline):
         n, ending = kernel.grow_track(
             length,
             math.inf if arm.joint_limit is None else float(arm.joint_limit),
@@ -258,7 +258,7 @@ def motion_of(track: Track, length: float, maze: Maze, deadline: float = math.in
     angles, before = np.empty((n_kept, n_links)), np.zeros((1, n_links))
     rows = max(1, POSED // n_links)
     for first in range(0, n_kept, rows):
-        if first > 0 and time.perf_counter() >= deadline:
+        if first > 0 and now() >= deadline:
             return None
         part = slice(first, first + rows)
         kernel.pose_joints(

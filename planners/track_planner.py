@@ -12,12 +12,12 @@ A motion in a similar maze is a better beginning than the path: the way of its t
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planners.clock import now
 from planners.feeding import feed, motion_of
 from planners.inset import inset_maze
 from planners.kernels import feeding as feeding_kernel
@@ -206,20 +206,20 @@ def plan_track(query: Query) -> Candidate:
     candidate : Candidate
         A motion with as many links as it needs, not yet validated, or the reason why there is none.
     """
-    clock = [time.perf_counter()]
+    clock = [now()]
     if query.warm_start is not None:
         track, scene = _from_motion(query, query.warm_start)
-        clock.append(time.perf_counter())
+        clock.append(now())
         if track is not None and scene is not None and track.poses is not None:
             return _solved(track.poses, scene, clock, {})
     geometry = query.geometry
     if geometry is None:
         return query.no_path()
-    clock = [time.perf_counter()]
+    clock = [now()]
     scene = Scene(maze=geometry.maze, length=query.arm.link_length, joint_limit=_limit(query))
     line = start_from_path(scene, scene.scaled(geometry.path.points))
     track = _finished(_grown(line, scene, query), scene, query)
-    clock.append(time.perf_counter())
+    clock.append(now())
     query.tell("plan", 1.0)
     if track.poses is not None:
         return _solved(track.poses, scene, clock, geometry.timings)
@@ -416,7 +416,7 @@ def _free_poses(track: _Track, scene: Scene, deadline: float) -> FloatArray | No
 
 def _solved(poses: FloatArray, scene: Scene, clock: list[float], timings: Mapping[str, float]) -> Candidate:
     motion = motion_of(poses, scene.length, scene.maze.base_pose)
-    clock.append(time.perf_counter())
+    clock.append(now())
     stages = dict(zip(("plan", "poses"), np.diff(clock).tolist(), strict=True))
     return Candidate(status=PlanningStatus.SOLVED, motion=motion, timings={**timings, **stages})
 

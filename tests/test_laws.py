@@ -138,7 +138,7 @@ def test_where_time_ends_while_poses_are_made_the_result_says_so(planner, monkey
         return now[0]
 
     case = laws.Case(kind="serpentine", maze=serpentine(4), arm=ArmSpec(link_length=100.0))
-    monkeypatch.setattr("planners.feeding.time.perf_counter", clock)
+    monkeypatch.setattr("planners.feeding.now", clock)
     result = plan(case.maze, case.arm, planner, time_budget=2.0, explain=False)
     assert result.status is PlanningStatus.OUT_OF_TIME
     laws.says_why(case, planner, result)

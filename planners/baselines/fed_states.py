@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
 
 from hrsnake_env.maze import Maze
+from planners.clock import now
 from planners.kernels import fed_arm as kernel
 from planners.kernels.fed_shortcut import shortcut
 from planners.kernels.types import FloatArray
@@ -72,9 +72,9 @@ class FedArm:
 
     def shortened(self, path: FloatArray, rng: np.random.Generator, seconds: float) -> FloatArray:
         """Return a path of states, shape (n, n_links), with shortcuts; `seconds` bounds the time roughly."""
-        late = time.perf_counter() + seconds
+        late = now() + seconds
         for _ in range(BATCHES):
-            if len(path) < 3 or time.perf_counter() > late:
+            if len(path) < 3 or now() > late:
                 break
             path = shortcut(path, rng.random((BATCH, 2)), self.scene)
         return path

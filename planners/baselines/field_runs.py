@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
+from planners.clock import now
 from planners.kernels import field_steps as kernel
 from planners.kernels.types import FloatArray
 from planners.problem import Candidate, Failure, Motion, PlanningStatus
@@ -136,7 +136,7 @@ def plan_by_forces(query: Query, move: Mover, attempts: Iterable[Gains], per_lin
     geometry = query.geometry
     if geometry is None:
         return query.no_path()
-    start, refused, ended = time.perf_counter(), [], []
+    start, refused, ended = now(), [], []
     attempts = list(attempts)
     for number, gains in enumerate(attempts):
         query.tell("plan", number / len(attempts))
@@ -185,7 +185,7 @@ def _motion(states: FloatArray, query: Query) -> Motion:
 
 
 def _solved(motion: Motion, geometry: Geometry, start: float) -> Candidate:
-    seconds = time.perf_counter() - start
+    seconds = now() - start
     return Candidate(
         status=PlanningStatus.SOLVED, motion=motion, timings={**geometry.timings, "plan": seconds}
     )
@@ -224,5 +224,5 @@ def _failed(query: Query, outcome: _Outcome, geometry: Geometry, start: float) -
             path_position=geometry.path.length - _way_left(outcome, query, geometry),
             joints=np.concatenate([query.maze.base_pose[None, :2], joints]),
         ),
-        timings={**geometry.timings, "plan": time.perf_counter() - start},
+        timings={**geometry.timings, "plan": now() - start},
     )

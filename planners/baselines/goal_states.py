@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 
 from planners.baselines.fed_states import FedArm
+from planners.clock import now
 from planners.kernels.fed_growth import MOST, Chains, Guide, farthest_seen, grow
 from planners.kernels.types import FloatArray, IntArray
 
@@ -68,7 +67,7 @@ def grown_goal_states(
     rng : Generator
         Draws directions.
     deadline : float
-        When to stop, on the clock of `time.perf_counter`.
+        When to stop, on the clock of `planners.clock.now`.
 
     Returns
     -------
@@ -85,7 +84,7 @@ def grown_goal_states(
         states = [state for state in states if arm.is_clear(state)]
         if states:
             return _roomiest(arm, states, number, rng), _points(chains, int(there[0])) * arm.link_length
-        if time.perf_counter() > deadline:
+        if now() > deadline:
             break
         chosen = _chosen(chains, joints, rng)
         draws = rng.random((len(chosen), MOST))

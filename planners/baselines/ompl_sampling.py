@@ -20,7 +20,6 @@ import functools
 import importlib
 import importlib.util
 import math
-import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,6 +29,7 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners.baselines.fed_states import MARGIN, FedArm, fed_arm, state_bounds
 from planners.baselines.goal_states import grown_goal_states, guide_along
+from planners.clock import now
 from planners.kernels.types import FloatArray
 from planners.problem import Candidate, Failure, PlanningStatus
 from planners.query import Query
@@ -115,7 +115,7 @@ def plan_ompl(query: Query, *, algorithm: str = "RRTConnect", time_limit: float 
     if algorithm not in OMPL_PLANNERS:
         raise InputError(f"Unknown OMPL planner {algorithm!r}. Available: {', '.join(OMPL_PLANNERS)}.")
     warm_up()
-    return _plan(query, algorithm, min(query.deadline, time.perf_counter() + time_limit))
+    return _plan(query, algorithm, min(query.deadline, now() + time_limit))
 
 
 @functools.cache
@@ -132,7 +132,7 @@ def warm_up() -> None:
     importlib.import_module("ompl.geometric")
     maze = Maze.from_corridors([(0.0, 0.0), (0.0, 300.0), (300.0, 300.0)], 100.0)
     arm = ArmSpec(link_length=100.0)
-    _plan(Query(maze=maze, arm=arm), "RRTConnect", time.perf_counter() + TIME_LIMIT)
+    _plan(Query(maze=maze, arm=arm), "RRTConnect", now() + TIME_LIMIT)
 
 
 def _plan(query: Query, algorithm: str, deadline: float) -> Candidate:
@@ -142,23 +142,23 @@ def _plan(query: Query, algorithm: str, deadline: float) -> Candidate:
         return query.no_path()
     guide = guide_along(geometry.path.points, query.maze.goal, query.maze.goal_radius, length)
     rng, timings, margin = np.random.default_rng(query.seed), dict(geometry.timings), MARGIN
-    start, patience, reason = time.perf_counter(), PATIENCE, "OMPL's {} found no way in {:.3g} s."
+    start, patience, reason = now(), PATIENCE, "OMPL's {} found no way in {:.3g} s."
     query.tell("plan", 0.1)
     while True:
-        clock = [time.perf_counter()]
+        clock = [now()]
         arm = fed_arm(geometry.maze, length, query.arm.link_radius, query.arm.joint_limit, margin)
         goals, farthest = grown_goal_states(arm, guide, GOAL_STATES, rng, deadline)
-        clock.append(time.perf_counter())
+        clock.append(now())
         if not goals:
             _count(timings, clock)
             return _no_goal_states(farthest, clock[-1] > deadline, timings)
         path = _path(arm, goals, algorithm, query, min(patience, deadline - clock[-1]), rng)
-        clock.append(time.perf_counter())
+        clock.append(now())
         if path is not None:
             path = arm.shortened(path, rng, min(SHORTENING, clock[2] - clock[1], deadline - clock[2]))
-            clock.append(time.perf_counter())
+            clock.append(now())
             motion = arm.motion(path)
-            clock.append(time.perf_counter())
+            clock.append(now())
         _count(timings, clock)
         if path is None and clock[-1] < deadline:
             patience *= 2.0  # other goal states, perhaps of another number of links, may be nearer
@@ -171,7 +171,7 @@ def _plan(query: Query, algorithm: str, deadline: float) -> Candidate:
                 timings=timings,
             )
         report = query.check(motion)
-        if report is None or report.valid or time.perf_counter() > deadline:
+        if report is None or report.valid or now() > deadline:
             return Candidate(status=PlanningStatus.SOLVED, motion=motion, timings=timings)
         margin *= FINER
         reason = "OMPL's {} found no way in {:.3g} s that the exact check agrees with."

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -11,6 +10,7 @@ import numpy as np
 import shapely
 
 from hrsnake_env.maze import Maze
+from planners.clock import now
 from planners.feeding import LATE, feed, motion_of
 from planners.kernels import feeding as kernel
 from planners.kernels.types import FloatArray
@@ -63,7 +63,7 @@ def fed_along(
     base_pose : array, shape (3,)
         Base position and heading.
     deadline : float
-        When to stop, on the clock of `time.perf_counter`.
+        When to stop, on the clock of `planners.clock.now`.
     """
     fed = feed(track, link_length, base_pose, deadline=deadline)
     if fed.ending == LATE:
@@ -95,7 +95,7 @@ def best_of(query: Query, geometry: Geometry, trials: Iterable[Trial]) -> Candid
         Where no motion is valid, the one that gets least deep into the walls; where there is no motion at
         all, a dead end with the reason and the place of the first variant; out of time if not all were tried.
     """
-    begin, best, depth, stuck, late = time.perf_counter(), None, np.inf, None, False
+    begin, best, depth, stuck, late = now(), None, np.inf, None, False
     maze = geometry.maze
     for trial in trials:
         if isinstance(trial, Stuck):
@@ -140,7 +140,7 @@ def _dead_end(query: Query, geometry: Geometry, begin: float, stuck: Stuck, late
 
 
 def _timings(geometry: Geometry, begin: float) -> dict[str, float]:
-    return {**geometry.timings, "plan": time.perf_counter() - begin}
+    return {**geometry.timings, "plan": now() - begin}
 
 
 def _depth(motion: Motion, maze: Maze) -> float:

@@ -16,12 +16,12 @@ How far one must look is a part of `hrsnake bench spatial`.
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass
 
 import numpy as np
 
 from hrsnake_env.arm import FloatArray
+from planners.clock import now
 from planners.kernels import spatial_track as kernel
 from planners.path import arclength, resampled
 from planners.problem import Failure, PlanningStatus
@@ -247,9 +247,9 @@ def plan_causal(query: SpatialQuery, horizon: float = HORIZON) -> SpatialCandida
     """Plan by a joint track that is grown from the tip on; the checker says whether the motion is free."""
     if query.path is None:
         return query.no_path()
-    begin = time.perf_counter()
+    begin = now()
     grown = grow_track(query, horizon)
-    query.timings["plan"] = time.perf_counter() - begin
+    query.timings["plan"] = now() - begin
     if grown.status is not PlanningStatus.SOLVED:
         return SpatialCandidate(
             status=grown.status, reason=_reason(query, grown), failure=grown.failure, track=grown.track

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass
 
 import numpy as np
 
+from planners.clock import now
 from planners.feeding import STEP, feed
 from planners.kernels import feeding as feeding_kernel
 from planners.kernels.spatial_chords import chord_errors, place_on_path
@@ -84,7 +84,7 @@ def plan_following(query: SpatialQuery) -> SpatialCandidate:
     path = query.path
     if path is None:
         return query.no_path()
-    begin = time.perf_counter()
+    begin = now()
     motion = follow_path(path, query.workspace, query.arm.link_length)
-    query.timings["poses"] = time.perf_counter() - begin
+    query.timings["poses"] = now() - begin
     return SpatialCandidate(status=PlanningStatus.SOLVED, motion=motion, track=path.points)

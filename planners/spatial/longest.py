@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 from hrsnake_env.arguments import check_at_least
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
+from planners.clock import now
 from planners.problem import PlanningStatus, Progress
 from planners.spatial.planning import check_planner, check_time_budget, plan
 from planners.spatial.problem import SpatialMotion, SpatialResult
@@ -185,7 +185,7 @@ class _Search:
         """Plan with links of a length; tell whether there is a motion."""
         if self.progress is not None:
             self.progress(f"{length:.4g} {self.workspace.units}", min(length / self.workspace.size, 1.0))
-        start = time.perf_counter()
+        start = now()
         arm = self.arm(length)
         try:
             self.workspace.check_arm(arm)
@@ -198,7 +198,7 @@ class _Search:
                 status=result.status,
                 n_links=None if result.motion is None else result.motion.n_links,
                 clearance=None if result.report is None or not result.solved else result.report.clearance,
-                seconds=time.perf_counter() - start,
+                seconds=now() - start,
             )
         )
         if result.solved and length > self.length:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import time
 from collections.abc import Callable
 
 import numpy as np
@@ -12,6 +11,7 @@ from hrsnake_env.arguments import is_number
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.errors import InputError
 from planners.checking import Checker, Late
+from planners.clock import now
 from planners.problem import Attempt, Failure, PlanningStatus, Progress
 from planners.spatial.causal_planner import plan_causal
 from planners.spatial.following import plan_following
@@ -89,7 +89,7 @@ def plan(
     check_planner(planner)
     check_time_budget(time_budget)
     workspace.check_arm(arm)
-    deadline = time.perf_counter() + time_budget
+    deadline = now() + time_budget
     bare = dataclasses.replace(arm, n_links=None)  # planners give as many links as the motion needs
     seen, origin = _from_base(workspace)
     checker = Checker[SpatialMotion](
@@ -107,9 +107,9 @@ def plan(
     attempts: list[Attempt] = []
     first: SpatialResult | None = None
     for name in AUTO if planner == "auto" else (planner,):
-        begin, checker.seconds = time.perf_counter(), 0.0
+        begin, checker.seconds = now(), 0.0
         result = _answer(name, query, checker)
-        seconds = time.perf_counter() - begin
+        seconds = now() - begin
         attempts.append(Attempt(planner=name, route=0, status=result.status, seconds=seconds))
         timings = {**query.timings, "validate": checker.seconds}
         first = first or dataclasses.replace(result, timings=timings)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hrsnake_env.arm import ArmSpec, FloatArray
+from planners.clock import now
 from planners.problem import PlanningStatus, Progress, ValidationReport
 from planners.spatial.entries import point_text
 from planners.spatial.path import Path, global_path
@@ -40,7 +40,7 @@ class SpatialQuery:
     workspace, arm
         What is asked. The workspace is seen from `origin`, and so is all that planners hand on.
     deadline : float
-        On the clock of `time.perf_counter`.
+        On the clock of `planners.clock.now`.
     check : callable
         The exact checker.
     warm_start : tuple of array, shape (n, 3), and float; or None
@@ -72,17 +72,17 @@ class SpatialQuery:
     @property
     def late(self) -> bool:
         """Whether time is over."""
-        return time.perf_counter() > self.deadline
+        return now() > self.deadline
 
     @cached_property
     def path(self) -> Path | None:
         """The path of a ball of the link radius; None if there is no way on the grid."""
         self.tell("path", 0.0)
-        start = time.perf_counter()
+        start = now()
         potential = laplace_potential(self.workspace, radius=self.arm.link_radius)
-        middle = time.perf_counter()
+        middle = now()
         path = None if potential is None else global_path(self.workspace, potential)
-        self.timings |= {"potential": middle - start, "path": time.perf_counter() - middle}
+        self.timings |= {"potential": middle - start, "path": now() - middle}
         self.tell("path", 1.0)
         return path
 

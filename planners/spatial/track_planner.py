@@ -14,12 +14,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import time
 from dataclasses import dataclass
 
 import numpy as np
 
 from hrsnake_env.arm import FloatArray
+from planners.clock import now
 from planners.feeding import feed
 from planners.kernels import feeding as feeding_kernel
 from planners.kernels import spatial_track as kernel
@@ -148,9 +148,9 @@ def plan_track(query: SpatialQuery) -> SpatialCandidate:
 
 def _attempt(query: SpatialQuery, effort: Effort) -> SpatialCandidate | None:
     """Shape a track and feed the arm along it; None if time runs out."""
-    begin = time.perf_counter()
+    begin = now()
     shaped = _shaped(query, effort)
-    shaping = time.perf_counter() - begin
+    shaping = now() - begin
     query.timings["plan"] = query.timings.get("plan", 0.0) + shaping
     if shaped is None:
         return None
@@ -162,7 +162,7 @@ def _attempt(query: SpatialQuery, effort: Effort) -> SpatialCandidate | None:
 
 def candidate_along(query: SpatialQuery, curve: FloatArray) -> SpatialCandidate:
     """Feed the arm along a track, shape (n, 3), from the straight stretch on; or say where a joint jumps."""
-    begin = time.perf_counter()
+    begin = now()
     length = query.arm.link_length
     base_pose = query.workspace.base_pose_for(length)
     curve = np.concatenate([base_pose[None, :3], curve])
@@ -170,7 +170,7 @@ def candidate_along(query: SpatialQuery, curve: FloatArray) -> SpatialCandidate:
     motion = None
     if fed.ending == feeding_kernel.DONE:
         motion = SpatialMotion.from_joints(fed.poses, length, base_pose)
-    query.timings["poses"] = query.timings.get("poses", 0.0) + time.perf_counter() - begin
+    query.timings["poses"] = query.timings.get("poses", 0.0) + now() - begin
     if motion is not None:
         return SpatialCandidate(status=PlanningStatus.SOLVED, motion=motion, track=curve)
     return SpatialCandidate(
