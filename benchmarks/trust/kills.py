@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 from rich.progress import Progress
 
-from benchmarks.trust.forks import Child, at_write, die, files_in, run
+from benchmarks.trust.forks import Child, at_write, die, files_in, run, stopped
 from hrsnake_env.files import PART
 
 OUT = Path("benchmarks/results/trust")
@@ -188,9 +188,10 @@ COMMANDS = {command.name: command for command in (Longest(), Bench(), Train(), D
 def warm(base, with_training):
     """Load and compile what the commands need, and write the motion that is exported."""
     if with_training:
-        from planners.rl import clone
+        from planners.rl import clone, fitting
 
         clone.TESTS, clone.LEAST_STEPS = 1, 300  # the files are at stake, not the figures
+        fitting.UPDATES, fitting.CHECK = 40, 20
     peace = base / "warm"
     peace.mkdir()
     before, words = os.getcwd(), sys.argv
@@ -334,9 +335,8 @@ def peace_of_export(base, arguments):
     return _exports[key]
 
 
-def campaign(count, seed, names, bar):
-    """Attack the commands; return figures by command."""
-    figures = {}
+def campaign(count, seed, names, bar, figures):
+    """Attack the commands; put what is found into the figures by command."""
     with tempfile.TemporaryDirectory(prefix="hrsnake-kills-") as name:
         base = Path(name).resolve()
         warm(base, with_training=Train.name in names)
@@ -346,10 +346,7 @@ def campaign(count, seed, names, bar):
             peace = in_peace(command, base, seed)
             figures[each] = figure = {"cases": 0, "killed": 0, "writes": peace[3], "faults": []}
             for number in range(seed, seed + count):
-                try:
-                    found, killed = attack(command, base, number, peace)
-                except KeyboardInterrupt:
-                    return figures
+                found, killed = attack(command, base, number, peace)
                 figure["cases"] += 1
                 figure["killed"] += killed
                 figure["seconds"] = round(time.monotonic() - start, 1)
@@ -358,7 +355,6 @@ def campaign(count, seed, names, bar):
                     print(f"{each}, --command '{each}' --seed {number} --count 1: {fault}", flush=True)
                 bar.advance(tasks[each])
                 bar.refresh()
-    return figures
 
 
 def main():
@@ -370,8 +366,9 @@ def main():
     options = parser.parse_args()
     if "DISPLAY" in os.environ:
         os.environ.setdefault("MPLBACKEND", "agg")
+    figures, names = {}, options.command or list(COMMANDS)
     with Progress(auto_refresh=False) as bar:  # no thread beside a process that forks
-        figures = campaign(options.count, options.seed, options.command or list(COMMANDS), bar)
+        cut = stopped(lambda: campaign(options.count, options.seed, names, bar, figures))
     for name, figure in figures.items():
         print(
             f"{name}: {figure['cases']} runs, {figure['killed']} of them killed amid their work, "
@@ -386,7 +383,7 @@ def main():
         "python": platform.python_version(),
     }
     (OUT / "kills.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-    return int(any(figure["faults"] for figure in figures.values()))
+    return 130 if cut else int(any(figure["faults"] for figure in figures.values()))
 
 
 if __name__ == "__main__":
