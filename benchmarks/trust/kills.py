@@ -123,9 +123,10 @@ class Train:
         if (folder / "r" / "checkpoint.zip").exists():
             read_progress(folder / "r" / "checkpoint.zip")
             read_model(folder / "r" / "checkpoint.zip", Lessons.load)
+        policy = folder / "r" / "policy.npz"
+        policy = whole_npz(policy) if policy.exists() else None
         if not (folder / "r" / "run.json").exists():
             return None
-        policy = whole_npz(folder / "r" / "policy.npz")
         return without_times(json.loads((folder / "r" / "run.json").read_text())), policy
 
 
@@ -296,6 +297,10 @@ def attack(command, base, seed, peace):
     except Exception as error:
         faults.append(f"half a file was taken for a whole one: {type(error).__name__}: {error}")
         done = None
+    if isinstance(command, Export):
+        facts, names = peace_of_export(base, arguments)
+        if done not in (None, facts):
+            faults.append("half a file stands where a whole one should")
     if command.name != "dataset" or done is None:
         again = run(arguments, folder)
         if again.code != 0:
@@ -303,8 +308,6 @@ def attack(command, base, seed, peace):
         elif command.facts(folder) is None:
             faults.append("the next run left no result")
     if not faults:
-        if isinstance(command, Export):
-            facts, names = peace_of_export(base, arguments)
         if command.facts(folder) != facts:
             faults.append("the result is another one than in peace")
         if [name for name in files_in(folder) if PART not in name] != names:
