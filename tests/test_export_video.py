@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 
 from hrsnake_env import ArmSpec, Maze
+from hrsnake_env.pictures import MazePicture
 from planners import plan
 from planners.export import TrajectoryLimits, export
 from planners.problem import Motion
@@ -53,6 +54,16 @@ def test_an_mp4_takes_as_long_as_the_arm(motion: Motion, tmp_path) -> None:
     reader.close()
     assert facts["codec"].startswith("h264")
     assert "yuv420p" in facts["pix_fmt"]
+
+
+@pytest.mark.parametrize("kind", ["gif", "mp4"])
+def test_ctrl_c_before_the_first_frame_is_ctrl_c(motion: Motion, kind, monkeypatch) -> None:
+    def stop(*_args, **_kwargs):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(MazePicture, "draw_arm", stop)
+    with pytest.raises(KeyboardInterrupt):
+        export(motion, MAZE, None, kind, LIMITS)
 
 
 def test_a_page_needs_nothing_else(motion: Motion) -> None:

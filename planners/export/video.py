@@ -21,6 +21,7 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from hrsnake_env.pictures import MazePicture
 from planners.export.trajectory import Trajectory
+from planners.interrupts import interruption_first
 from planners.problem import Progress
 
 __all__ = ["gif_bytes", "mp4_bytes"]
@@ -62,7 +63,7 @@ def _film(
     writer, settings = _writer(kind, rate)
     picture = MazePicture(maze, height=HEIGHT, title="orange: pinches a wall")
     reach = link_radius + PINCH_TOLERANCE * trajectory.link_length
-    with TemporaryDirectory() as folder, settings, _ffmpeg_errors(folder):
+    with TemporaryDirectory() as folder, settings, interruption_first(), _ffmpeg_errors(folder):
         out = Path(folder) / f"arm.{kind}"
         with writer.saving(picture.figure, str(out), dpi=picture.figure.dpi):
             for number, joints in enumerate(frames):
