@@ -1,8 +1,8 @@
 """Kill -9 amid `longest`, `bench`, `train`, `dataset` and `export`: nothing is lost, no half file is read.
 
 Each command runs once in peace, then in folders of its own until it has been killed COUNT times: half the
-times at any moment, half at a moment at which it writes. Then all files must be whole, no process may be left,
-and the same command, run again, must end with the same results as in peace, with no other file beside them.
+times at any moment, half at a moment at which it writes. Then all files must be whole, no process may be
+left, and the same command, run again, must end with the same results as in peace, with no other file beside.
 """
 
 from __future__ import annotations
