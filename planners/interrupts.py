@@ -2,8 +2,8 @@
 
 Python raises KeyboardInterrupt at any line. If that line belongs to a function that was called from C, the
 exception is printed and dropped (pymunk's callbacks, finalizers), leaves memory half freed, or comes out as
-another one (SystemError from numba's cached kernels, ImportError from numpy, ValueError from matplotlib). So it
-waits for that to end.
+another one (SystemError from numba's cached kernels, ImportError from numpy, ValueError from matplotlib). So
+it waits for that to end.
 """
 
 from __future__ import annotations
