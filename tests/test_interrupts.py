@@ -2,13 +2,17 @@
 
 import os
 import signal
+import subprocess
 import sys
 import time
 import types
+from pathlib import Path
 
 import pytest
 
 from planners.interrupts import careful_interrupts, in_foreign_code, interruption_first
+
+ROOT = Path(__file__).parents[1]
 
 
 def in_module(name, function="work"):
@@ -96,6 +100,21 @@ def test_a_library_that_fails_after_ctrl_c_does_not_hide_it():
             [][0]
     with pytest.raises(IndexError), interruption_first():
         [][0]
+
+
+def test_ctrl_c_while_the_command_loads_is_one_sentence():
+    press_it = (
+        "import os, signal, sys, hrsnake\n"
+        "def hook(event, arguments):\n"
+        "    if event == 'import' and arguments[0] == 'planners.planning':\n"
+        "        os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.addaudithook(hook)\n"
+        "sys.argv = ['hrsnake', '--help']\n"
+        "hrsnake.main()\n"
+    )
+    run = subprocess.run([sys.executable, "-c", press_it], cwd=ROOT, capture_output=True, text=True)
+    assert (run.returncode, run.stdout) == (130, "")
+    assert run.stderr == "hrsnake: stopped; no half-written file is left.\n"
 
 
 @pytest.mark.parametrize("handler", [signal.SIG_IGN, lambda *_: None])
