@@ -99,7 +99,7 @@ def campaign(count, seed, names, bar, figures):
     """Attack the commands; put what is found into the figures by command."""
     with tempfile.TemporaryDirectory(prefix="hrsnake-ctrl-c-") as place:
         base = Path(place).resolve()
-        warm(base, with_training="train" in names)
+        warm(base, names)
         for name in names:
             task = bar.add_task(name, total=count)
             peace = base / "peace" / name

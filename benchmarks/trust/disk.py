@@ -180,7 +180,7 @@ def campaign(names, bar, figures):
             importlib.import_module(module)
         (base / "here").mkdir()
         (base / "here").chmod(0o777)
-        warm(base, with_training="train --out" in names)
+        warm(base, names)
         task = bar.add_task("disk", total=len(names))
         for name in names:
             for k in range(len(list(ways(name, base)))):

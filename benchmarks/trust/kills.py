@@ -189,9 +189,13 @@ class Export:
 COMMANDS = {command.name: command for command in (Longest(), Bench(), Train(), Dataset(), Export())}
 
 
-def warm(base, with_training):
-    """Load and compile what the commands need, and write the motion that is exported."""
-    if with_training:
+def warm(base, names):
+    """Load and compile what the commands need, and write the motion that is exported.
+
+    The first words of their names tell them.
+    """
+    kinds = {name.split()[0] for name in names}
+    if "train" in kinds:
         from planners.rl import clone, fitting
 
         clone.TESTS, clone.LEAST_STEPS = 1, 300  # the files are at stake, not the figures
@@ -207,9 +211,14 @@ def warm(base, with_training):
         motion = base / "motion.npz"
         whole = [
             command.arguments(peace, random.Random(0))
-            for command in (Longest(), Dataset(), *([Train()] if with_training else []))
+            for command in (Longest(), Dataset(), Train())
+            if command.name.split()[0] in kinds
         ]
-        exports = [f"export straight {motion} --out a.{e} --metres-per-unit 0.001 {FAST}" for e in EXPORTS]
+        exports = [
+            f"export straight {motion} --out a.{ending} --metres-per-unit 0.001 {FAST}"
+            for ending in EXPORTS
+            if "export" in kinds
+        ]
         plan = f"plan straight --link-length 100 --out {motion} --json"
         for words_of in (plan.split(), *whole, *(export.split() for export in exports)):
             sys.argv = ["hrsnake", *words_of]
@@ -345,7 +354,7 @@ def campaign(count, seed, names, bar, figures):
     """Attack the commands; put what is found into the figures by command."""
     with tempfile.TemporaryDirectory(prefix="hrsnake-kills-") as name:
         base = Path(name).resolve()
-        warm(base, with_training=Train.name in names)
+        warm(base, names)
         tasks = {each: bar.add_task(each, total=count) for each in names}
         for each in names:
             command, start = COMMANDS[each], time.monotonic()

@@ -108,7 +108,8 @@ def _writer(kind: str, rate: float) -> tuple[Any, AbstractContextManager[Any]]:
         raise InputError(
             "Expected imageio-ffmpeg, which writes MP4; install it with: pip install 'hrsnake[export]'"
         ) from None
-    writer = FFMpegWriter(fps=rate, codec="h264", extra_args=["-pix_fmt", "yuv420p"])  # type: ignore[arg-type]
+    options = ["-pix_fmt", "yuv420p", "-loglevel", "quiet"]  # Ctrl-C is its own, too, and it would say so
+    writer = FFMpegWriter(fps=rate, codec="h264", extra_args=options)  # type: ignore[arg-type]
     return writer, mpl.rc_context({"animation.ffmpeg_path": imageio_ffmpeg.get_ffmpeg_exe()})
 
 
