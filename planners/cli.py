@@ -55,7 +55,9 @@ from planners.planning import TIME_BUDGET, plan
 from planners.problem import Motion, PlanningResult, Progress
 from planners.validation import validate
 
-__all__ = ["app", "main"]
+__all__ = ["INTERRUPTED", "STOPPED", "app", "main"]
+
+STOPPED = "hrsnake: stopped; no half-written file is left."
 
 app = typer.Typer(name="hrsnake", pretty_exceptions_enable=False)
 
@@ -403,7 +405,7 @@ def main() -> None:
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED
     if code == INTERRUPTED:  # typer turns Ctrl-C into this code
-        print("hrsnake: stopped; no half-written file is left.", file=sys.stderr)
+        print(STOPPED, file=sys.stderr)
     sys.exit(code or 0)
 
 

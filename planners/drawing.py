@@ -20,6 +20,7 @@ from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
 from hrsnake_env.pictures import MazePicture
 from planners.figures import draw_beams, draw_path, mark_corner
+from planners.interrupts import interruption_first
 from planners.problem import Motion, PlanningResult, Progress
 from planners.survey import Geometry, survey
 
@@ -134,7 +135,8 @@ def animate(maze: Maze, run: Run, out: Path, progress: Progress | None = None) -
     picture = MazePicture(maze, title="orange: pinches a wall")
     frames = np.unique(np.linspace(0, len(run.joints) - 1, N_FRAMES).round().astype(int))
     writer = PillowWriter(fps=FRAMES_PER_SECOND)
-    with replacing(out) as part, writer.saving(picture.figure, part, dpi=picture.figure.dpi):
+    dpi = picture.figure.dpi
+    with interruption_first(), replacing(out) as part, writer.saving(picture.figure, part, dpi=dpi):
         for number, frame in enumerate(frames):
             picture.draw_arm(run.joints[frame], pinched=run.pinched(frame), collided=run.collided(frame))
             writer.grab_frame(facecolor=picture.figure.get_facecolor())

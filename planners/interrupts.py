@@ -2,7 +2,8 @@
 
 Python raises KeyboardInterrupt at any line. If that line belongs to a function that was called from C, the
 exception is printed and dropped (pymunk's callbacks, finalizers), leaves memory half freed, or comes out as
-another one (SystemError from numba's cached kernels, ImportError from numpy). So it waits for that to end.
+another one (SystemError from numba's cached kernels, ImportError from numpy, ValueError from matplotlib). So
+it waits for that to end.
 """
 
 from __future__ import annotations
@@ -16,12 +17,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
-__all__ = ["again", "careful_interrupts", "in_foreign_code"]
+__all__ = ["again", "careful_interrupts", "in_foreign_code", "interruption_first"]
 
 FOREIGN = (
     "pymunk",
     "cffi",
     "llvmlite",
+    "matplotlib.path",
+    "matplotlib.transforms",
     "numba.core.caching",
     "numba.core.serialize",
     "numba.core.typing.typeof",
@@ -115,9 +118,28 @@ def careful_interrupts() -> Iterator[None]:
     signal.signal(signal.SIGINT, handler)
     atexit.register(signal.signal, signal.SIGINT, signal.SIG_DFL)
     try:
-        yield
+        try:
+            yield
+        except Exception as error:
+            if handler.asked is not None:
+                raise KeyboardInterrupt from error  # as a child that was interrupted, too, has failed
+            raise
         if handler.asked is not None:
             raise KeyboardInterrupt
     finally:
         handler.closed = True
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@contextmanager
+def interruption_first() -> Iterator[None]:
+    """Let Ctrl-C through where a library fails as it cleans up after it, as with a film without a frame."""
+    try:
+        yield
+    except Exception as error:
+        before: BaseException | None = error
+        while before is not None:
+            if isinstance(before, KeyboardInterrupt):
+                raise KeyboardInterrupt from error
+            before = before.__context__
+        raise

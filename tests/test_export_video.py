@@ -5,9 +5,11 @@ import re
 
 import imageio_ffmpeg
 import pytest
+from matplotlib.animation import FFMpegWriter
 from PIL import Image
 
 from hrsnake_env import ArmSpec, Maze
+from hrsnake_env.pictures import MazePicture
 from planners import plan
 from planners.export import TrajectoryLimits, export
 from planners.problem import Motion
@@ -53,6 +55,30 @@ def test_an_mp4_takes_as_long_as_the_arm(motion: Motion, tmp_path) -> None:
     reader.close()
     assert facts["codec"].startswith("h264")
     assert "yuv420p" in facts["pix_fmt"]
+
+
+def test_ctrl_c_before_the_first_frame_is_ctrl_c(motion: Motion, monkeypatch) -> None:
+    def stop(*_args, **_kwargs):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(MazePicture, "draw_arm", stop)
+    with pytest.raises(KeyboardInterrupt):
+        export(motion, MAZE, None, "gif", LIMITS)
+
+
+def test_ffmpeg_says_nothing_of_its_own_when_it_is_cut_short(motion: Motion, monkeypatch, caplog) -> None:
+    writers = []
+    run = FFMpegWriter._run
+
+    def stop(*_args, **_kwargs):
+        writers[0]._proc.stdin.write(b"half a frame")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(FFMpegWriter, "_run", lambda self: (writers.append(self), run(self)))
+    monkeypatch.setattr(MazePicture, "draw_arm", stop)
+    with pytest.raises(KeyboardInterrupt):
+        export(motion, MAZE, None, "mp4", LIMITS)
+    assert not caplog.text
 
 
 def test_a_page_needs_nothing_else(motion: Motion) -> None:

@@ -37,7 +37,7 @@ def test_commands_that_are_killed_lose_nothing(tmp_path):
 
 def test_ctrl_c_ends_commands_with_one_sentence(tmp_path):
     pytest.importorskip("minari")
-    said = campaign("ctrl_c", "--count", "2", "--command", "simulate", "--command", "longest", cwd=tmp_path)
+    said = campaign("ctrl_c", "--count", "2", "--command", "draw", "--command", "longest", cwd=tmp_path)
     assert said.count("2 times") == 2
 
 

@@ -2,13 +2,17 @@
 
 import os
 import signal
+import subprocess
 import sys
 import time
 import types
+from pathlib import Path
 
 import pytest
 
-from planners.interrupts import careful_interrupts, in_foreign_code
+from planners.interrupts import careful_interrupts, in_foreign_code, interruption_first
+
+ROOT = Path(__file__).parents[1]
 
 
 def in_module(name, function="work"):
@@ -25,7 +29,15 @@ def seen_in(module, function="work"):
 
 @pytest.mark.parametrize(
     "module",
-    ["pymunk.space", "cffi.api", "llvmlite.binding.ffi", "numba.core.serialize", "namedtuple_3", "weakref"],
+    [
+        "pymunk.space",
+        "cffi.api",
+        "llvmlite.binding.ffi",
+        "matplotlib.path",
+        "numba.core.serialize",
+        "namedtuple_3",
+        "weakref",
+    ],
 )
 def test_what_c_calls_is_foreign_code(module):
     assert seen_in(module)
@@ -72,6 +84,37 @@ def test_ctrl_c_that_waits_at_the_end_is_not_lost():
     with pytest.raises(KeyboardInterrupt), careful_interrupts():
         in_module("pymunk.space")(lambda: press(wait=0.0))
     press(0, 0.05)  # and it does not come twice
+
+
+def test_ctrl_c_that_waits_comes_before_an_error():
+    with pytest.raises(KeyboardInterrupt), careful_interrupts():
+        in_module("pymunk.space")(lambda: press(wait=0.0))
+        raise BrokenPipeError("of a child that Ctrl-C has ended")
+
+
+def test_a_library_that_fails_after_ctrl_c_does_not_hide_it():
+    with pytest.raises(KeyboardInterrupt), interruption_first():
+        try:
+            raise KeyboardInterrupt
+        finally:
+            [][0]
+    with pytest.raises(IndexError), interruption_first():
+        [][0]
+
+
+def test_ctrl_c_while_the_command_loads_is_one_sentence():
+    press_it = (
+        "import os, signal, sys, hrsnake\n"
+        "def hook(event, arguments):\n"
+        "    if event == 'import' and arguments[0] == 'planners.planning':\n"
+        "        os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.addaudithook(hook)\n"
+        "sys.argv = ['hrsnake', '--help']\n"
+        "hrsnake.main()\n"
+    )
+    run = subprocess.run([sys.executable, "-c", press_it], cwd=ROOT, capture_output=True, text=True)
+    assert (run.returncode, run.stdout) == (130, "")
+    assert run.stderr == "hrsnake: stopped; no half-written file is left.\n"
 
 
 @pytest.mark.parametrize("handler", [signal.SIG_IGN, lambda *_: None])

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from rich.progress import Progress
 
-from benchmarks.trust.forks import Child, run
+from benchmarks.trust.forks import Child, run, stopped
 from benchmarks.trust.kills import FAST, OUT, warm
 from hrsnake_env.files import LOCK, PART
 
@@ -95,12 +95,11 @@ def attack(name, base, seed, seconds, normal):
         return faults_of(child, normal, folder), child.code
 
 
-def campaign(count, seed, names, bar):
-    """Attack the commands; return figures by command."""
-    figures = {}
+def campaign(count, seed, names, bar, figures):
+    """Attack the commands; put what is found into the figures by command."""
     with tempfile.TemporaryDirectory(prefix="hrsnake-ctrl-c-") as place:
         base = Path(place).resolve()
-        warm(base, with_training="train" in names)
+        warm(base, names)
         for name in names:
             task = bar.add_task(name, total=count)
             peace = base / "peace" / name
@@ -116,19 +115,15 @@ def campaign(count, seed, names, bar):
             figures[name] = figure = {"cases": 0, "interrupted": 0, "faults": []}
             start = time.monotonic()
             for number in range(seed, seed + count):
-                try:
-                    found, code = attack(name, base, number, seconds, normal)
-                except KeyboardInterrupt:
-                    return figures
+                found, code = attack(name, base, number, seconds, normal)
                 figure["cases"] += 1
-                figure["interrupted"] += code == 130
+                figure["interrupted"] += code == 130 or name == "studio"  # to which it is the usual end
                 figure["seconds"] = round(time.monotonic() - start, 1)
                 for fault in found:
                     figure["faults"].append({"seed": number, "fault": fault})
                     print(f"--command '{name}' --seed {number} --count 1: {fault}", flush=True)
                 bar.advance(task)
                 bar.refresh()
-    return figures
 
 
 def main():
@@ -139,8 +134,9 @@ def main():
     parser.add_argument("--command", action="append", choices=list(COMMANDS), help="by default all")
     options = parser.parse_args()
     os.environ.setdefault("MPLBACKEND", "agg")
+    figures, names = {}, options.command or list(COMMANDS)
     with Progress(auto_refresh=False) as bar:  # no thread beside a process that forks
-        figures = campaign(options.count, options.seed, options.command or list(COMMANDS), bar)
+        cut = stopped(lambda: campaign(options.count, options.seed, names, bar, figures))
     for name, figure in figures.items():
         print(
             f"Ctrl-C in {name}: {figure['cases']} times, {figure['interrupted']} amid its work, "
@@ -155,7 +151,7 @@ def main():
         "python": platform.python_version(),
     }
     (OUT / "ctrl_c.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-    return int(any(figure["faults"] for figure in figures.values()))
+    return 130 if cut else int(any(figure["faults"] for figure in figures.values()))
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from rich.progress import Progress
 
-from benchmarks.trust.forks import run
+from benchmarks.trust.forks import run, stopped
 from benchmarks.trust.kills import FAST, OUT, warm
 from hrsnake_env.files import LOCK, PART
 
@@ -171,9 +171,8 @@ def attack(name, way, make, prepare, base, place):
     return [f"{name}, {way}: {fault}: {said[-1500:]}" for fault in faults]
 
 
-def campaign(names, bar):
-    """Try all ways with the commands; return figures by way."""
-    figures = {}
+def campaign(names, bar, figures):
+    """Try all ways with the commands; put what is found into the figures by way."""
     with tempfile.TemporaryDirectory(prefix="hrsnake-disk-") as top:
         base = Path(top).resolve()
         base.chmod(0o755)
@@ -181,7 +180,7 @@ def campaign(names, bar):
             importlib.import_module(module)
         (base / "here").mkdir()
         (base / "here").chmod(0o777)
-        warm(base, with_training="train --out" in names)
+        warm(base, names)
         task = bar.add_task("disk", total=len(names))
         for name in names:
             for k in range(len(list(ways(name, base)))):
@@ -203,7 +202,6 @@ def campaign(names, bar):
                         print(fault, flush=True)
             bar.advance(task)
             bar.refresh()
-    return figures
 
 
 def main():
@@ -212,14 +210,15 @@ def main():
     parser.add_argument("--command", action="append", choices=[*FILES, *FOLDERS], help="by default all")
     options = parser.parse_args()
     os.environ.setdefault("MPLBACKEND", "agg")
+    figures, names = {}, options.command or [*FILES, *FOLDERS]
     with Progress(auto_refresh=False) as bar:  # no thread beside a process that forks
-        figures = campaign(options.command or [*FILES, *FOLDERS], bar)
+        cut = stopped(lambda: campaign(names, bar, figures))
     for way, figure in figures.items():
         print(f"{way}: {figure['cases']} commands, {len(figure['faults'])} faults")
     OUT.mkdir(parents=True, exist_ok=True)
     record = {"ways": figures, "python": platform.python_version()}
     (OUT / "disk.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-    return int(any(figure["faults"] for figure in figures.values()))
+    return 130 if cut else int(any(figure["faults"] for figure in figures.values()))
 
 
 if __name__ == "__main__":

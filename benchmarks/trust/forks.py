@@ -57,6 +57,7 @@ class Child:
             multiprocessing.get_context = lambda method=None: get("fork")
             sys.argv = ["hrsnake", *map(str, arguments)]
             signal.signal(signal.SIGINT, signal.default_int_handler)
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
             prepare()
             cli.main()
         except SystemExit as end:
@@ -73,17 +74,29 @@ class Child:
             os._exit(code if isinstance(code, int) else 1)
 
     def wait(self, seconds=PATIENCE_S):
-        """Return the exit code, negative for a signal; None if it still runs after so long."""
+        """Return the exit code, negative for a signal; None if it still runs after so long.
+
+        A campaign that is itself stopped meanwhile takes the child with it.
+        """
         end = time.monotonic() + seconds
-        while self.code is None:
+        try:
+            while not self._has_ended():
+                if time.monotonic() > end:
+                    return None
+                time.sleep(0.002)
+        except BaseException:
+            self.send(signal.SIGKILL)
+            while not self._has_ended():
+                time.sleep(0.002)
+            raise
+        return self.code
+
+    def _has_ended(self):
+        if self.code is None:
             pid, status = os.waitpid(self.pid, os.WNOHANG)
             if pid:
                 self.code = os.waitstatus_to_exitcode(status)
-            elif time.monotonic() > end:
-                return None
-            else:
-                time.sleep(0.002)
-        return self.code
+        return self.code is not None
 
     def send(self, number, group=True):
         """Send a signal to it, or to all its processes."""
@@ -107,6 +120,10 @@ class Child:
 
 def _group_lives(group):
     """Tell whether a process group has a process that is no zombie (of nobody who asks for its end)."""
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False  # the common case, without a look at all processes
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
             try:
@@ -115,6 +132,26 @@ def _group_lives(group):
                 continue
             if int(its_group) == group and state != "Z":
                 return True
+    return False
+
+
+def stopped(campaign):
+    """Run a campaign; tell whether Ctrl-C, or the signal that ends a process, stopped it.
+
+    Both come as exceptions, so that temporary folders, mounts and children go before this process does.
+    """
+
+    def end(*_):
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        campaign()
+    except KeyboardInterrupt:
+        return True
+    finally:
+        signal.signal(signal.SIGTERM, before)
     return False
 
 

@@ -1,8 +1,8 @@
 """Kill -9 amid `longest`, `bench`, `train`, `dataset` and `export`: nothing is lost, no half file is read.
 
-Each command runs once in peace, then COUNT times in a folder of its own, where it is killed: half the times
-at any moment, half at a moment at which it writes. Then all files must be whole, no process may be left, and
-the same command, run again, must end with the same results as in peace, with no other file beside them.
+Each command runs once in peace, then in folders of its own until it has been killed COUNT times: half the
+times at any moment, half at a moment at which it writes. Then all files must be whole, no process may be
+left, and the same command, run again, must end with the same results as in peace, with no other file beside.
 """
 
 from __future__ import annotations
@@ -24,13 +24,16 @@ from pathlib import Path
 import numpy as np
 from rich.progress import Progress
 
-from benchmarks.trust.forks import Child, at_write, die, files_in, run
+from benchmarks.trust.forks import Child, at_write, die, files_in, run, stopped
 from hrsnake_env.files import PART
 
 OUT = Path("benchmarks/results/trust")
 
 TIMES = ("seconds", "cpu_seconds", "check_seconds", "timings", "curve")
 """What no two runs agree in."""
+
+MOST_RUNS = 3
+"""For each kill: a run that has ended before its kill does not count as one."""
 
 FAST = "--rate 20 --joint-speed 900 --feed-speed 500 --feed-acceleration 9000 --joint-acceleration 9000"
 EXPORTS = ("csv", "json", "npz", "yaml", "urdf", "gif", "html")
@@ -123,9 +126,10 @@ class Train:
         if (folder / "r" / "checkpoint.zip").exists():
             read_progress(folder / "r" / "checkpoint.zip")
             read_model(folder / "r" / "checkpoint.zip", Lessons.load)
+        policy = folder / "r" / "policy.npz"
+        policy = whole_npz(policy) if policy.exists() else None
         if not (folder / "r" / "run.json").exists():
             return None
-        policy = whole_npz(folder / "r" / "policy.npz")
         return without_times(json.loads((folder / "r" / "run.json").read_text())), policy
 
 
@@ -185,12 +189,17 @@ class Export:
 COMMANDS = {command.name: command for command in (Longest(), Bench(), Train(), Dataset(), Export())}
 
 
-def warm(base, with_training):
-    """Load and compile what the commands need, and write the motion that is exported."""
-    if with_training:
-        from planners.rl import clone
+def warm(base, names):
+    """Load and compile what the commands need, and write the motion that is exported.
+
+    The first words of their names tell them.
+    """
+    kinds = {name.split()[0] for name in names}
+    if "train" in kinds:
+        from planners.rl import clone, fitting
 
         clone.TESTS, clone.LEAST_STEPS = 1, 300  # the files are at stake, not the figures
+        fitting.UPDATES, fitting.CHECK = 40, 20
     peace = base / "warm"
     peace.mkdir()
     before, words = os.getcwd(), sys.argv
@@ -202,9 +211,14 @@ def warm(base, with_training):
         motion = base / "motion.npz"
         whole = [
             command.arguments(peace, random.Random(0))
-            for command in (Longest(), Dataset(), *([Train()] if with_training else []))
+            for command in (Longest(), Dataset(), Train())
+            if command.name.split()[0] in kinds
         ]
-        exports = [f"export straight {motion} --out a.{e} --metres-per-unit 0.001 {FAST}" for e in EXPORTS]
+        exports = [
+            f"export straight {motion} --out a.{ending} --metres-per-unit 0.001 {FAST}"
+            for ending in EXPORTS
+            if "export" in kinds
+        ]
         plan = f"plan straight --link-length 100 --out {motion} --json"
         for words_of in (plan.split(), *whole, *(export.split() for export in exports)):
             sys.argv = ["hrsnake", *words_of]
@@ -295,6 +309,10 @@ def attack(command, base, seed, peace):
     except Exception as error:
         faults.append(f"half a file was taken for a whole one: {type(error).__name__}: {error}")
         done = None
+    if isinstance(command, Export):
+        facts, names = peace_of_export(base, arguments)
+        if done not in (None, facts):
+            faults.append("half a file stands where a whole one should")
     if command.name != "dataset" or done is None:
         again = run(arguments, folder)
         if again.code != 0:
@@ -302,8 +320,6 @@ def attack(command, base, seed, peace):
         elif command.facts(folder) is None:
             faults.append("the next run left no result")
     if not faults:
-        if isinstance(command, Export):
-            facts, names = peace_of_export(base, arguments)
         if command.facts(folder) != facts:
             faults.append("the result is another one than in peace")
         if [name for name in files_in(folder) if PART not in name] != names:
@@ -334,31 +350,28 @@ def peace_of_export(base, arguments):
     return _exports[key]
 
 
-def campaign(count, seed, names, bar):
-    """Attack the commands; return figures by command."""
-    figures = {}
+def campaign(count, seed, names, bar, figures):
+    """Attack the commands; put what is found into the figures by command."""
     with tempfile.TemporaryDirectory(prefix="hrsnake-kills-") as name:
         base = Path(name).resolve()
-        warm(base, with_training=Train.name in names)
+        warm(base, names)
         tasks = {each: bar.add_task(each, total=count) for each in names}
         for each in names:
             command, start = COMMANDS[each], time.monotonic()
             peace = in_peace(command, base, seed)
             figures[each] = figure = {"cases": 0, "killed": 0, "writes": peace[3], "faults": []}
-            for number in range(seed, seed + count):
-                try:
-                    found, killed = attack(command, base, number, peace)
-                except KeyboardInterrupt:
-                    return figures
+            for number in range(seed, seed + MOST_RUNS * count):
+                if figure["killed"] == count:
+                    break
+                found, killed = attack(command, base, number, peace)
                 figure["cases"] += 1
                 figure["killed"] += killed
                 figure["seconds"] = round(time.monotonic() - start, 1)
                 for fault in found:
                     figure["faults"].append({"seed": number, "fault": fault})
                     print(f"{each}, --command '{each}' --seed {number} --count 1: {fault}", flush=True)
-                bar.advance(tasks[each])
+                bar.update(tasks[each], completed=figure["killed"])
                 bar.refresh()
-    return figures
 
 
 def main():
@@ -370,8 +383,9 @@ def main():
     options = parser.parse_args()
     if "DISPLAY" in os.environ:
         os.environ.setdefault("MPLBACKEND", "agg")
+    figures, names = {}, options.command or list(COMMANDS)
     with Progress(auto_refresh=False) as bar:  # no thread beside a process that forks
-        figures = campaign(options.count, options.seed, options.command or list(COMMANDS), bar)
+        cut = stopped(lambda: campaign(options.count, options.seed, names, bar, figures))
     for name, figure in figures.items():
         print(
             f"{name}: {figure['cases']} runs, {figure['killed']} of them killed amid their work, "
@@ -386,7 +400,7 @@ def main():
         "python": platform.python_version(),
     }
     (OUT / "kills.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-    return int(any(figure["faults"] for figure in figures.values()))
+    return 130 if cut else int(any(figure["faults"] for figure in figures.values()))
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from hrsnake_env.pictures import MazePicture
 from planners.export.trajectory import Trajectory
+from planners.interrupts import interruption_first
 from planners.problem import Progress
 
 __all__ = ["gif_bytes", "mp4_bytes"]
@@ -62,7 +63,7 @@ def _film(
     writer, settings = _writer(kind, rate)
     picture = MazePicture(maze, height=HEIGHT, title="orange: pinches a wall")
     reach = link_radius + PINCH_TOLERANCE * trajectory.link_length
-    with TemporaryDirectory() as folder, settings, _ffmpeg_errors(folder):
+    with TemporaryDirectory() as folder, settings, interruption_first(), _ffmpeg_errors(folder):
         out = Path(folder) / f"arm.{kind}"
         with writer.saving(picture.figure, str(out), dpi=picture.figure.dpi):
             for number, joints in enumerate(frames):
@@ -107,7 +108,8 @@ def _writer(kind: str, rate: float) -> tuple[Any, AbstractContextManager[Any]]:
         raise InputError(
             "Expected imageio-ffmpeg, which writes MP4; install it with: pip install 'hrsnake[export]'"
         ) from None
-    writer = FFMpegWriter(fps=rate, codec="h264", extra_args=["-pix_fmt", "yuv420p"])  # type: ignore[arg-type]
+    options = ["-pix_fmt", "yuv420p", "-loglevel", "quiet"]  # Ctrl-C is its own, too, and it would say so
+    writer = FFMpegWriter(fps=rate, codec="h264", extra_args=options)  # type: ignore[arg-type]
     return writer, mpl.rc_context({"animation.ffmpeg_path": imageio_ffmpeg.get_ffmpeg_exe()})
 
 
