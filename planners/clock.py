@@ -1,7 +1,7 @@
 """The clock of time budgets: it stands still while numba compiles.
 
-Kernels are compiled when they are first used on a machine: half a minute in all, and more on a slow one. Planning
-does not take that time, and a budget would be over before a plan is begun.
+Kernels are compiled when they are first used on a machine: half a minute in all, and more on a slow one. That
+is no time of planning, and a budget would be over before a plan is begun.
 """
 
 from __future__ import annotations
