@@ -64,7 +64,9 @@ class Passage(StrEnum):
 class RodPath:
     """Hold a motion of one rod; the arrays are read-only.
 
-    From each place to the next the rod is either moved without turning, or turned about its tail.
+    From each place to the next the rod is either moved without turning, or turned about its tail. Where the
+    goal is on the straight way in front of the base, the rod need not leave the feeder: from its first place
+    it is pulled back, its tail behind the base.
 
     Parameters
     ----------
@@ -91,6 +93,14 @@ class RodPath:
         """The rod's other end, shape (n, 2)."""
         along = np.stack([np.cos(self.headings), np.sin(self.headings)], axis=-1)
         return np.asarray(self.tails + self.length * along)
+
+    @property
+    def way(self) -> FloatArray:
+        """Waypoints from the base to the goal, shape (m, 2): the tails and the last tip."""
+        first, last = self.tails[0], self.tails[-1]
+        heading = (math.cos(self.headings[0]), math.sin(self.headings[0]))
+        pulled_back = len(self.tails) == 2 and (last - first) @ heading < 0.0
+        return np.concatenate([self.tails[:1] if pulled_back else self.tails, self.tips[-1:]])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -151,8 +161,9 @@ def rod_bound(
 ) -> RodBound:
     """Compute the length of the longest rod that passes from the base to the goal.
 
-    The rod starts with its tail at the base, along the base heading; it may touch walls; at the end its tip
-    is within the goal radius of the goal.
+    The rod comes out of the feeder along the base heading, and turns only once its tail has passed the base;
+    it may touch walls; at the end its tip is within the goal radius of the goal. Where the goal is on the
+    straight way in front of the base, any rod passes that fits there: it may end still in the feeder.
 
     Parameters
     ----------
@@ -189,6 +200,8 @@ def rod_bound(
         return RodBound(lower=0.0, upper=0.0, limited_by="maze", proven=True, path=None)
     questions = _Questions(inset)
     lower, upper, best, part = 0.0, questions.straight, None, PART
+    if (ahead := questions.straight_path(upper)) is not None:
+        lower, best = upper, ahead
     while upper - lower > accuracy * upper and time.perf_counter() < deadline:
         if progress is not None:
             progress("rod bound", _share((upper - lower) / upper, accuracy))
@@ -278,6 +291,8 @@ class _Questions:
         """Decide whether a rod passes; start from the first triangles and halve those that are in doubt."""
         if length > self.straight:
             return RodVerdict(passes=Passage.NO, length=length)
+        if (ahead := self.straight_path(length)) is not None:
+            return RodVerdict(passes=Passage.YES, length=length, path=ahead)
         task = _task(self.maze, self._first.walls, length, resolution)
         space, every = _copy(self._first), True
         while True:
@@ -299,6 +314,16 @@ class _Questions:
             path=_path(space, task, nodes, headings) if passes is Passage.YES else None,
             n_triangles=int(space.counts[1]),
         )
+
+    def straight_path(self, length: float) -> RodPath | None:
+        """Return the motion of a rod that reaches the goal on the straight way; None if it does not."""
+        x, y, heading = self.maze.base_pose
+        base, along = np.array([x, y]), np.array([math.cos(heading), math.sin(heading)])
+        out = min(max(0.0, float((self.maze.goal - base) @ along)), length)
+        if math.dist(base + out * along, self.maze.goal) > self.maze.goal_radius:
+            return None
+        tails = np.array([base, base - (length - out) * along])
+        return RodPath(length=length, tails=tails, headings=np.array([heading, heading]))
 
     def _way(self, space: RodSpace, task: Task) -> tuple[IntArray, FloatArray, IntArray]:
         """Return nodes and headings of the cheapest way, base first, and the triangles to be halved."""
