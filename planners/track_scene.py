@@ -65,8 +65,12 @@ class Scene:
 
     @cached_property
     def rings(self) -> list[FloatArray]:
-        """The walls as rings, each of shape (n_vertices, 2), with the free space on the left."""
-        return [self.scaled(ring[:-1]) for ring in self.maze.rings]
+        """The walls as rings, each of shape (n_vertices, 2), with the free space on the left.
+
+        Corners that turning and scaling put on one another are one corner: no wall is a point.
+        """
+        rings = [_without_repeats(self.scaled(ring[:-1])) for ring in self.maze.rings]
+        return [ring for ring in rings if len(ring) > 1]
 
     @cached_property
     def outward(self) -> list[FloatArray]:
@@ -76,7 +80,7 @@ class Scene:
     @cached_property
     def near(self) -> Surroundings:
         """Walls and corners, for the kernels."""
-        walls = self.scaled(self.maze.walls)
+        walls = np.concatenate([np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in self.rings])
         convex = np.concatenate([_outward(ring)[0] for ring in self.rings])
         origin = walls.min(axis=(0, 1)) - 1.0
         size = walls.max(axis=(0, 1)) + 1.0 - origin
@@ -103,12 +107,14 @@ class Scene:
         return bool(kernel.wall_between(a[0], a[1], b[0], b[1], self.near.walls) < 0)
 
 
+def _without_repeats(ring: FloatArray) -> FloatArray:
+    return ring[(ring != np.roll(ring, 1, axis=0)).any(axis=1)]
+
+
 def _outward(ring: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Tell which vertices of a ring are convex corners, and the way from each into the free space."""
     before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
-    # Corners that rounding has put on one another have no way between them.
-    before = before / np.maximum(np.hypot(*before.T), 1e-300)[:, None]
-    after = after / np.maximum(np.hypot(*after.T), 1e-300)[:, None]
+    before, after = before / np.hypot(*before.T)[:, None], after / np.hypot(*after.T)[:, None]
     convex = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] < 0.0
     # Across the mean of both edges, to the left of them, where the free space is.
     across = np.column_stack([-(before + after)[:, 1], (before + after)[:, 0]])
