@@ -344,7 +344,11 @@ def _checked_parts(free_space: Any) -> list[Polygon]:
 
 
 def _without_collinear_vertices(polygon: Polygon) -> Polygon:
-    """Return the same polygon with fewer vertices, so that a maze from its own polygon is the same maze."""
+    """Return the same polygon with fewer vertices, so that a maze from its own polygon is the same maze.
+
+    No vertex comes twice in a row, whatever rounding makes of the rest: no wall is a point.
+    """
+    polygon = shapely.remove_repeated_points(polygon)
     while True:
         simple = polygon.simplify(0.0)
         fewer = shapely.get_num_coordinates(simple) < shapely.get_num_coordinates(polygon)

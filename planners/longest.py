@@ -28,8 +28,8 @@ from planners.validation import validate
 
 __all__ = ["ACCURACY", "TIME_BUDGET", "LongestLink", "longest_link"]
 
-VERSION = 2
-"""Part of a state's digest: raise it when planners learn to pass what they did not."""
+VERSION = 3
+"""Part of a state's digest: raise it when planners learn to pass what they did not, or the bound changes."""
 
 ACCURACY = 0.0025
 """Step of the grid of lengths, as a share of the length."""

@@ -7,8 +7,6 @@ import itertools
 from collections.abc import Iterator
 from typing import NamedTuple
 
-import numpy as np
-
 from planners.kernels.types import FloatArray
 from planners.problem import Motion
 from planners.query import Query
@@ -56,7 +54,7 @@ def further_questions(query: Query, rod: RodPath | None) -> Iterator[Question]:
     """Yield what to ask on other ways: first a rod's that passes, then the medial axis'; cheap ones first."""
     if query.geometry is None:
         return
-    ways = [] if rod is None else [np.concatenate([rod.tails, rod.tips[-1:]])]
+    ways = [] if rod is None else [rod.way]
     ways += list(itertools.islice(_other_ways(query), MAX_ROUTES))
     variants = [dataclasses.replace(query, route=way, thorough=False) for way in ways]
     for planner in ("track", "sweep"):

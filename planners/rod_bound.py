@@ -64,14 +64,16 @@ class Passage(StrEnum):
 class RodPath:
     """Hold a motion of one rod; the arrays are read-only.
 
-    From each place to the next the rod is either moved without turning, or turned about its tail.
+    From each place to the next the rod is either moved without turning, or turned about its tail. Where the
+    goal is on the straight way in front of the base, the rod need not leave the feeder: from its first place
+    it is pulled back, its tail behind the base.
 
     Parameters
     ----------
     length : float
         Of the rod.
     tails : array-like, shape (n, 2)
-        From the base, in maze units; of a rod that is at the goal before it is out, behind the base.
+        From the base, in maze units.
     headings : array-like, shape (n,)
         From tail to tip, in rad, without jumps of 2 pi.
     """
@@ -91,6 +93,14 @@ class RodPath:
         """The rod's other end, shape (n, 2)."""
         along = np.stack([np.cos(self.headings), np.sin(self.headings)], axis=-1)
         return np.asarray(self.tails + self.length * along)
+
+    @property
+    def way(self) -> FloatArray:
+        """Waypoints from the base to the goal, shape (m, 2): the tails and the last tip."""
+        first, last = self.tails[0], self.tails[-1]
+        heading = (math.cos(self.headings[0]), math.sin(self.headings[0]))
+        pulled_back = len(self.tails) == 2 and (last - first) @ heading < 0.0
+        return np.concatenate([self.tails[:1] if pulled_back else self.tails, self.tips[-1:]])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -151,8 +161,9 @@ def rod_bound(
 ) -> RodBound:
     """Compute the length of the longest rod that passes from the base to the goal.
 
-    The rod comes out of the feeder, along the base heading; it may touch walls; at the end its tip is within
-    the goal radius of the goal. If that is so before all of it is out, only the feeder limits it.
+    The rod comes out of the feeder along the base heading, and turns only once its tail has passed the base;
+    it may touch walls; at the end its tip is within the goal radius of the goal. Where the goal is on the
+    straight way in front of the base, any rod passes that fits there: it may end still in the feeder.
 
     Parameters
     ----------
@@ -189,6 +200,8 @@ def rod_bound(
         return RodBound(lower=0.0, upper=0.0, limited_by="maze", proven=True, path=None)
     questions = _Questions(inset)
     lower, upper, best, part = 0.0, questions.straight, None, PART
+    if (ahead := questions.straight_path(upper)) is not None:
+        lower, best = upper, ahead
     while upper - lower > accuracy * upper and now() < deadline:
         if progress is not None:
             progress("rod bound", _share((upper - lower) / upper, accuracy))
@@ -271,7 +284,6 @@ class _Questions:
     def __init__(self, maze: Maze) -> None:
         self.maze = maze
         self.straight = _straight_way(maze)
-        self.emerging = _way_of_a_tip(maze)
         self._first = _first_triangles(maze)
         self._work = _work_space(0)
 
@@ -279,10 +291,8 @@ class _Questions:
         """Decide whether a rod passes; start from the first triangles and halve those that are in doubt."""
         if length > self.straight:
             return RodVerdict(passes=Passage.NO, length=length)
-        if self.emerging <= min(length, self.straight):
-            return RodVerdict(
-                passes=Passage.YES, length=length, path=_path_of_a_tip(self.maze, length, self.emerging)
-            )
+        if (ahead := self.straight_path(length)) is not None:
+            return RodVerdict(passes=Passage.YES, length=length, path=ahead)
         task = _task(self.maze, self._first.walls, length, resolution)
         space, every = _copy(self._first), True
         while True:
@@ -305,6 +315,16 @@ class _Questions:
             n_triangles=int(space.counts[1]),
         )
 
+    def straight_path(self, length: float) -> RodPath | None:
+        """Return the motion of a rod that reaches the goal on the straight way; None if it does not."""
+        x, y, heading = self.maze.base_pose
+        base, along = np.array([x, y]), np.array([math.cos(heading), math.sin(heading)])
+        out = min(max(0.0, float((self.maze.goal - base) @ along)), length)
+        if math.dist(base + out * along, self.maze.goal) > self.maze.goal_radius:
+            return None
+        tails = np.array([base, base - (length - out) * along])
+        return RodPath(length=length, tails=tails, headings=np.array([heading, heading]))
+
     def _way(self, space: RodSpace, task: Task) -> tuple[IntArray, FloatArray, IntArray]:
         """Return nodes and headings of the cheapest way, base first, and the triangles to be halved."""
         n_nodes = FIRST + int(space.counts[1]) * PER_TRIANGLE
@@ -326,22 +346,6 @@ def _straight_way(maze: Maze) -> float:
     ray = LineString([(x, y), (x + reach * math.cos(heading), y + reach * math.sin(heading))])
     parts = shapely.get_parts(shapely.line_merge(ray.intersection(maze.free_space)))
     return float(min(parts, key=Point(x, y).distance).length)
-
-
-def _way_of_a_tip(maze: Maze) -> float:
-    """Return how far along the base heading a tip gets to the goal; infinite if it passes the goal by."""
-    way = complex(*(maze.goal - maze.base_pose[:2])) * np.exp(-1j * maze.base_pose[2])
-    if way.real < 0.0 or abs(way.imag) > maze.goal_radius:
-        return math.inf
-    return float(way.real - math.sqrt(maze.goal_radius**2 - way.imag**2))
-
-
-def _path_of_a_tip(maze: Maze, length: float, way: float) -> RodPath:
-    """Return the motion of a rod that comes out of the feeder by `way`."""
-    x, y, heading = maze.base_pose
-    behind = np.array([length, length - way])
-    tails = np.stack([x - behind * math.cos(heading), y - behind * math.sin(heading)], axis=1)
-    return RodPath(length=length, tails=tails, headings=np.full(2, heading))
 
 
 def _first_triangles(maze: Maze) -> RodSpace:

@@ -117,9 +117,7 @@ def _without_repeated(ring: FloatArray) -> FloatArray:
 def _outward(ring: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Tell which vertices of a ring are convex corners, and the way from each into the free space."""
     before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
-    # Corners that rounding has put on one another have no way between them.
-    before = before / np.maximum(np.hypot(*before.T), 1e-300)[:, None]
-    after = after / np.maximum(np.hypot(*after.T), 1e-300)[:, None]
+    before, after = before / np.hypot(*before.T)[:, None], after / np.hypot(*after.T)[:, None]
     convex = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] < 0.0
     # Across the mean of both edges, to the left of them, where the free space is.
     across = np.column_stack([-(before + after)[:, 1], (before + after)[:, 0]])

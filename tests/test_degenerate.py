@@ -18,6 +18,7 @@ from planners.potential import passage_width
 from planners.rod_bound import rod_bound
 from planners.spatial import Workspace, random_room
 from planners.spatial import plan as plan_in_space
+from planners.track_scene import Scene
 from planners.validation import validate
 
 
@@ -109,6 +110,27 @@ def test_points_on_a_straight_wall_make_no_walls():
     x = np.linspace(-0.05, 3.0, 10_000)
     ring = [*zip(x, np.full(x.size, -0.5), strict=True), (3.0, 0.5), (-0.05, 0.5)]
     assert len(corridor(free_space=Polygon(ring)).walls) == 4
+
+
+@pytest.mark.parametrize("angle", np.linspace(0.05, 3.95, 40))
+def test_no_wall_of_a_maze_is_a_point(angle):
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    ring = np.array([(-0.05, -0.5), (1.0, -0.5), (3.0, -0.5), (3.0, 0.5), (3.0, 0.5), (-0.05, 0.5)]) @ turn.T
+    maze = corridor(free_space=Polygon(ring), base_pose=(0.0, 0.0, angle), goal=turn @ (2.5, 0.0))
+    assert (maze.walls[:, 0] != maze.walls[:, 1]).any(axis=1).all()
+
+
+def test_no_wall_is_a_point_in_link_lengths_either():
+    # Corners a hair apart, which are one after a turn and a division.
+    ring = [(-0.05, -0.5), (3.0, -0.5)]
+    for k in range(60):
+        x, y = 3.0 - 0.05 * k, 0.5 + 0.001 * (k % 7)
+        ring += [(x, y), (np.nextafter(x, -np.inf), y)]
+    maze = corridor(free_space=Polygon(ring))
+    scene = Scene(maze=maze, length=1.3, joint_limit=np.inf)
+    assert len(scene.near.walls) < len(maze.walls)
+    assert (scene.near.walls[:, 0] != scene.near.walls[:, 1]).any(axis=1).all()
+    assert plan(maze, ArmSpec(link_length=1.3), "track").solved
 
 
 def test_small_pieces_of_walls_hardly_change_the_width_of_the_passage():

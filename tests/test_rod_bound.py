@@ -12,15 +12,15 @@ from scipy.optimize import minimize_scalar
 from shapely.affinity import rotate, scale
 from shapely.geometry import LineString, Polygon, box
 
+from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import fig19
 from planners.kernels.rod import free_directions
 from planners.kernels.rod_search import sweep_is_free
 from planners.kernels.rod_space import GAPS, SLACK, possible_gaps
-from planners.problem import Motion
+from planners.planning import plan
 from planners.rod_bound import Passage, _first_triangles, rod_bound, rod_passes
-from planners.validation import validate
 
 ACCURACY = 0.005
 """Of a bound, unless a test asks for another."""
@@ -147,11 +147,26 @@ def test_a_straight_way_to_the_end_is_limited_by_the_feeder():
     assert_near(bound, 995.0)
 
 
-def test_a_goal_before_the_end_of_a_straight_way_limits_the_rod():
-    # The longest rod lies from a corner at the start to the far side of the goal.
-    bound = rod_bound(maze_of(box(-50, 0, 50, 1000), (0, 5, math.pi / 2), (0, 800)))
-    assert bound.limited_by == "maze"
-    assert_near(bound, math.hypot(50, 800) + 10.0)
+def test_a_goal_on_the_straight_way_limits_no_rod():
+    # A longer rod gets there too, and ends still in the feeder.
+    maze = maze_of(box(-50, 0, 50, 1000), (0, 5, math.pi / 2), (8, 800))
+    bound = rod_bound(maze)
+    assert (bound.lower, bound.upper, bound.limited_by, bound.proven) == (995.0, 995.0, "feeder", True)
+    assert math.dist(bound.path.tips[-1], maze.goal) <= maze.goal_radius
+    assert bound.path.way.tolist() == pytest.approx(np.array([(0.0, 5.0), (0.0, 800.0)]))
+
+
+@pytest.mark.parametrize(("aside", "limited_by"), [(9.9, "feeder"), (10.1, "maze")])
+def test_a_goal_beside_the_straight_way_is_on_it_if_its_radius_says_so(aside, limited_by):
+    bound = rod_bound(maze_of(box(-50, 0, 50, 1000), (0, 5, math.pi / 2), (aside, 800)))
+    assert bound.limited_by == limited_by
+
+
+@pytest.mark.parametrize("length", [300.0, 794.0, 796.0, 900.0, 995.0])
+def test_a_link_with_a_motion_to_a_goal_on_the_straight_way_is_a_rod_that_passes(length):
+    maze = maze_of(box(-50, 0, 50, 1000), (0, 5, math.pi / 2), (0, 800))
+    assert plan(maze, ArmSpec(link_length=length)).solved
+    assert rod_passes(maze, length).passes is Passage.YES
 
 
 def test_a_goal_close_behind_a_corner_limits_the_rod():
@@ -316,26 +331,3 @@ def test_a_small_maze_is_decided_in_plain_python_too():
     maze = maze_of(box(0, 0, 10, 40).union(box(0, 30, 40, 40)), (5, 1, math.pi / 2), (35, 35), 2.0)
     assert rod_passes(maze, 20.0).passes is Passage.YES
     assert rod_passes(maze, 35.0).passes is Passage.NO
-
-
-@pytest.mark.parametrize("heading", [0.0, 2.0])
-@pytest.mark.parametrize(("goal", "radius"), [((2.5, 0.0), 0.1), ((1.0, 0.2), 0.3)])
-def test_a_goal_that_the_tip_gets_to_from_the_feeder_lets_the_feeder_alone_limit_the_rod(
-    goal, radius, heading
-):
-    room = rotate(box(-0.05, -0.5, 3.0, 0.5), heading, origin=(0, 0), use_radians=True)
-    turned = complex(*goal) * np.exp(1j * heading)
-    maze = Maze(
-        name="room",
-        free_space=room,
-        base_pose=np.array([0.0, 0.0, heading]),
-        goal=np.array([turned.real, turned.imag]),
-        goal_radius=radius,
-    )
-    bound = rod_bound(maze)
-    assert bound.upper == pytest.approx(3.0) and bound.limited_by == "feeder" and bound.lower > 2.98
-    np.testing.assert_allclose(bound.path.tips[0], 0.0, atol=1e-9)
-    way = np.hypot(*bound.path.tips[-1]) * (1.0 + 1e-9)
-    feeds = np.append(np.arange(0.0, way, 0.1), way)
-    motion = Motion.from_configurations(feeds, np.zeros((len(feeds), 1)), bound.lower, maze.base_pose)
-    assert validate(motion, maze).valid
