@@ -1,7 +1,6 @@
 """Laws of the curve-based baselines: where joints and links are, what they pass, and how they fail."""
 
 import dataclasses
-import time
 
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ from planners.baselines.backbone import WINDOWS, backbone_curve
 from planners.baselines.outer_wall import HELD, LONGEST_BEAMS, SHARES, outer_line
 from planners.baselines.path_following import followed_track
 from planners.baselines.trials import Stuck, best_of, fed_along
+from planners.clock import now
 from planners.path import arclength
 from planners.query import Query
 
@@ -194,7 +194,7 @@ def test_any_maze_has_an_outcome(planner, name):
 
 
 def test_after_the_deadline_no_more_variants_are_tried():
-    query = dataclasses.replace(asked("fig19", 430.0), deadline=time.perf_counter())
+    query = dataclasses.replace(asked("fig19", 430.0), deadline=now())
     joints = np.array([(0.0, 5.0), (0.0, 435.0)])
     trials = iter([Stuck(why="a joint would jump", joints=joints)] * 3)
     assert best_of(query, query.geometry, trials).status is PlanningStatus.OUT_OF_TIME

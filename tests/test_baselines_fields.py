@@ -1,7 +1,5 @@
 """Laws of the methods that move an arm by forces: virtual torques, and pseudo-inverse control with poles."""
 
-import time
-
 import numpy as np
 import pytest
 import shapely
@@ -15,6 +13,7 @@ from planners import PlanningStatus, plan
 from planners.baselines.field_runs import Gains, new_run, new_task
 from planners.baselines.pseudo_inverse import plan_pseudo_inverse
 from planners.baselines.virtual_torque import plan_virtual_torque
+from planners.clock import now
 from planners.kernels import field_algebra, field_moves
 from planners.kernels import field_arm as kernel
 from planners.kernels import field_steps as steps
@@ -204,7 +203,7 @@ def test_links_that_are_too_long_end_at_a_place_in_front_of_the_turn(planner):
 
 @BOTH
 def test_a_deadline_ends_planning(planner):
-    query = Query(maze=fig19(), arm=ArmSpec(link_length=60.0), deadline=time.perf_counter())
+    query = Query(maze=fig19(), arm=ArmSpec(link_length=60.0), deadline=now())
     candidate = PLANNERS[planner](query)
     assert candidate.status is PlanningStatus.OUT_OF_TIME and "time was over" in candidate.reason
 

@@ -1,7 +1,6 @@
 """Laws of every maze, arm and motion; `python -m benchmarks.trust.mazes` checks them on thousands."""
 
 import dataclasses
-import time
 
 import numpy as np
 import pytest
@@ -16,6 +15,7 @@ from hrsnake_env.arm import ArmSpec
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import fig19, serpentine
 from planners import PLANNERS, PlanningStatus, plan
+from planners.clock import now
 from planners.feeding import LATE, feed
 from planners.problem import Motion
 from planners.validation import validate
@@ -123,7 +123,7 @@ def test_feeding_goes_on_where_it_was_full(monkeypatch):
     monkeypatch.setattr("planners.feeding.ROOM", 20)
     pieces = feed(track, 1.0, np.zeros(3))
     np.testing.assert_array_equal(pieces.poses, whole.poses)
-    late = feed(track, 1.0, np.zeros(3), deadline=time.perf_counter())
+    late = feed(track, 1.0, np.zeros(3), deadline=now())
     assert late.ending == LATE and len(late.poses) < len(whole.poses)
 
 

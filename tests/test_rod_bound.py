@@ -1,7 +1,6 @@
 """The longest rod that passes: closed forms, laws, and a dense check of the rod's motion."""
 
 import math
-import time
 
 import numpy as np
 import pytest
@@ -16,6 +15,7 @@ from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import fig19
+from planners.clock import now
 from planners.kernels.rod import free_directions
 from planners.kernels.rod_search import sweep_is_free
 from planners.kernels.rod_space import GAPS, SLACK, possible_gaps
@@ -248,7 +248,7 @@ def test_the_rods_path_through_pillars_is_free_and_short():
 
 
 def test_without_time_the_interval_is_the_first_one():
-    bound = rod_bound(fig19(), deadline=time.perf_counter())
+    bound = rod_bound(fig19(), deadline=now())
     assert (bound.lower, bound.path, bound.proven, bound.limited_by) == (0.0, None, False, "feeder")
     assert bound.upper == pytest.approx(1595.0)
 

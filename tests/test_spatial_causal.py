@@ -1,12 +1,12 @@
 """Laws of the planner that grows its track from the tip on and sees the path only to a horizon."""
 
 import dataclasses
-import time
 
 import numpy as np
 import pytest
 
 from hrsnake_env.arm import ArmSpec
+from planners.clock import now
 from planners.kernels import spatial_track as kernel
 from planners.path import arclength, resampled
 from planners.problem import PlanningStatus
@@ -31,7 +31,7 @@ def query_of(workspace, length, path=None, seconds=60.0, **changes):
     query = SpatialQuery(
         workspace=workspace,
         arm=ArmSpec(link_length=length, **changes),
-        deadline=time.perf_counter() + seconds,
+        deadline=now() + seconds,
         check=lambda motion: validate(motion, workspace),
     )
     if path is not None:

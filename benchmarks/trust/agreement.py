@@ -38,13 +38,13 @@ def disagreements(motion, maze, arm, cores=()):
         one, other = getattr(report, name), getattr(twin, name)
         if one != other and not abs(one - other) <= 1e-9 * length:
             yield name, f"{name} is {one!r}, by the twin {other!r}, {(one - other) / length:.3g} links apart"
+    off = 1e-9 * length + twin.astray  # poses are as the joints say, between them the configuration decides
     for kind, wanted in twin.faulty.items():
-        if kind == "sweep" and wanted and "penetration" in kinds:
-            continue  # it is said already of the pose
+        if kind == "sweep" and wanted and ("penetration" in kinds or off > 1e-5 * length):
+            continue  # it is said already of the pose, or the two are not of one motion
         if wanted is not None and wanted is not (kind in kinds):
             yield f"verdict: {kind}", f"{kind} is {kind in kinds}, by the twin {wanted}"
     between = report.penetration_between
-    off = 1e-9 * length + twin.astray  # poses are as the joints say, between them the configuration decides
     if off < 1e-5 * length and not between + off >= twin.between_low:
         yield "bound between", f"the bound is {between!r}, the twin gets {twin.between_low!r} deep"
     if (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,6 +14,7 @@ from planners.baselines.ompl_sampling import OMPL_PLANNERS, plan_ompl
 from planners.baselines.ompl_sampling import warm_up as load_ompl
 from planners.bench.mazes import warm_up
 from planners.bench.pool import Tell, over_processes, worker_pool
+from planners.clock import now
 from planners.planning import plan
 from planners.query import Query
 from planners.validation import validate
@@ -98,7 +98,7 @@ def run_one(turns: int, index: float, planner: str, seed: int, time_limit: float
         motion, timings = result.motion, result.timings
     else:
         load_ompl()
-        query = Query(maze=maze, arm=arm, deadline=time.perf_counter() + time_limit, seed=seed)
+        query = Query(maze=maze, arm=arm, deadline=now() + time_limit, seed=seed)
         candidate = plan_ompl(query, algorithm=planner)
         motion, timings = candidate.motion, candidate.timings
     seconds = sum(value for stage, value in timings.items() if stage != "validate")

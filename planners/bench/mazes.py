@@ -7,6 +7,7 @@ from typing import Any
 
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.maze import Maze
+from planners.clock import now
 from planners.planning import plan
 from planners.rod_bound import rod_bound, rod_passes
 
@@ -60,7 +61,7 @@ def plan_in_maze(name: str, link_length: float, planner: str, time_budget: float
 
 def rod_in_maze(name: str, length: float, seconds: float) -> dict[str, Any]:
     """Say whether a rod of the length of a link passes a named maze: yes, no (a proof), or undecided."""
-    verdict = rod_passes(Maze.load(name), length, deadline=time.perf_counter() + seconds)
+    verdict = rod_passes(Maze.load(name), length, deadline=now() + seconds)
     return {"task": [name, length, seconds], "maze": name, "link_length": length, "rod": str(verdict.passes)}
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -20,6 +19,7 @@ from planners.checks.arm_alone import check_steps
 from planners.checks.scene import CHUNK, Scene, prepared
 from planners.checks.tolerances import ROUNDING, STEP_LIMIT
 from planners.checks.walls import nearest
+from planners.clock import now
 from planners.kernels.beam_arm import GOAL
 from planners.kernels.types import FloatArray
 from planners.planning import plan
@@ -131,7 +131,7 @@ def try_planner(
         maze.check_arm(arm)
     except InputError as error:
         return Trial(status="does not fit", came=0.0, why=str(error))
-    query = Query(maze=maze, arm=arm, deadline=time.perf_counter() + TIME_BUDGET)
+    query = Query(maze=maze, arm=arm, deadline=now() + TIME_BUDGET)
     if geometry is not None:
         query.surveys[id(query.route)] = geometry
     if rules is not None:

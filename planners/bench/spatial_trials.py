@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hrsnake_env.arm import ArmSpec, FloatArray
+from planners.clock import now
 from planners.feeding import feed
 from planners.kernels.feeding import DONE
 from planners.path import arclength
@@ -242,7 +243,7 @@ def farthest_with_horizon(horizon: float) -> dict[str, Any]:
         query = SpatialQuery(
             workspace=workspace,
             arm=arm,
-            deadline=time.perf_counter() + HORIZON_SECONDS,
+            deadline=now() + HORIZON_SECONDS,
             check=lambda motion: validate(motion, workspace),
         )
         motion = plan_causal(query, horizon).motion
