@@ -13,11 +13,13 @@ from strategies import cases, similarities
 from benchmarks.trust import maze_laws as laws
 from benchmarks.trust.maze_draws import draw_case, with_far_part, with_far_walls
 from hrsnake_env.arm import ArmSpec
+from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import fig19, serpentine
 from planners import PLANNERS, PlanningStatus, plan
 from planners.feeding import LATE, feed
 from planners.problem import Motion
+from planners.room import most_poses
 from planners.validation import validate
 
 FEW = settings(max_examples=8)
@@ -168,3 +170,41 @@ def test_a_check_tells_before_it_looks_at_the_first_pose():
     )
     validate(motion, maze, progress=lambda stage, share: told.append(share))
     assert told[0] == 0.0 and told == sorted(told)
+
+
+LONGEST_ARM = 1.1e-3
+"""Link length in sizes of the maze: hardly more than the shortest that is planned for."""
+
+POSING = ("track", "sweep", "beam", "as-printed", "follow", "backbone")
+
+
+@pytest.mark.parametrize("planner", ["beam", "as-printed"])
+def test_rules_that_run_out_of_time_with_thousands_of_links_have_a_reason_and_a_place(planner):
+    maze = fig19()
+    case = laws.Case(kind="fig19", maze=maze, arm=ArmSpec(link_length=LONGEST_ARM * maze.size))
+    result, _ = laws.timed_plan(case, planner, 0.2)
+    laws.says_why(case, planner, result)
+    assert result.status is PlanningStatus.OUT_OF_TIME
+
+
+@pytest.mark.parametrize("planner", [*POSING, "auto"])
+def test_a_motion_that_would_fill_the_memory_is_refused_with_a_place(planner, monkeypatch):
+    monkeypatch.setattr("planners.room.MOTION_BYTES", 20_000)
+    case = laws.Case(kind="fig19", maze=fig19(), arm=ArmSpec(link_length=200.0))
+    result, _ = laws.timed_plan(case, planner, 20.0)
+    laws.says_why(case, planner, result)
+    assert not result.solved and "Longer links take less" in result.reason
+
+
+def test_files_hold_whatever_motions_are_made(solved, tmp_path, monkeypatch):
+    _, result = solved[0]
+    motion, path = result.motion, tmp_path / "motion.npz"
+    motion.save(path)
+    taken = motion.joints.nbytes + motion.joint_angles.nbytes + motion.feed.nbytes
+    monkeypatch.setattr("planners.room.MOTION_BYTES", taken)
+    assert most_poses(motion.n_links) == motion.n_poses
+    monkeypatch.setattr("planners.problem.MOTION_BYTES", taken + 4096)
+    assert Motion.load(path).n_poses == motion.n_poses
+    monkeypatch.setattr("planners.problem.MOTION_BYTES", taken)
+    with pytest.raises(InputError):
+        Motion.load(path)

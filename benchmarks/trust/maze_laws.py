@@ -22,6 +22,7 @@ __all__ = [
     "LAWS",
     "Broken",
     "cut_short",
+    "on_time",
     "replace_maze",
     "says_why",
     "stays_valid",
@@ -37,7 +38,7 @@ LAWS = {
     "exception": "no planner raises on a valid maze",
     "saved": "a returned motion, saved and loaded, is valid",
     "reason": "without a motion the result says why, and where",
-    "time": "planning ends in time",
+    "time": "planning ends in time, counted in seconds of the processor",
     "moved motion": "a motion is valid in the maze that is moved, turned, mirrored and scaled with it",
     "moved plan": "planning in such a maze ends the same way",
     "far walls": "walls that no arm can reach change nothing",
@@ -49,16 +50,25 @@ LAWS = {
 AS_MANY_LINKS = 1
 """Links that the same motion in a moved maze may take more or less."""
 
+LATE = 1.0
+"""Seconds of the processor that planning may take longer than its budget."""
+
 
 class Broken(AssertionError):
     """Raised where a law does not hold."""
 
 
 def timed_plan(case: Case, planner: str, time_budget: float) -> tuple[PlanningResult, float]:
-    """Plan, and say how long it took."""
-    start = time.perf_counter()
+    """Plan, and say how many seconds of the processor it took: others may use the machine as well."""
+    start = time.process_time()
     result = plan(case.maze, case.arm, planner, time_budget=time_budget, explain=False)
-    return result, time.perf_counter() - start
+    return result, time.process_time() - start
+
+
+def on_time(seconds: float, time_budget: float) -> None:
+    """Check how many seconds of the processor planning took."""
+    if seconds > time_budget + LATE:
+        raise Broken(f"{seconds:.1f} s of the processor with a budget of {time_budget:g} s")
 
 
 def says_why(case: Case, planner: str, result: PlanningResult) -> None:
