@@ -11,7 +11,7 @@ from shapely.geometry import Polygon, box
 from strategies import cases, similarities
 
 from benchmarks.trust import maze_laws as laws
-from benchmarks.trust.maze_draws import draw_case, with_far_part, with_far_walls
+from benchmarks.trust.maze_draws import Similarity, draw_case, in_other_order, with_far_part, with_far_walls
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
@@ -83,6 +83,20 @@ def test_another_part_of_the_free_space_changes_no_digit_of_a_plan(solved):
         far = laws.replace_maze(case, with_far_part(case.maze, np.random.default_rng(number)))
         again, _ = laws.timed_plan(far, "auto", 30.0 * BUDGET)
         np.testing.assert_array_equal(again.motion.joints, result.motion.joints)
+
+
+def test_a_maze_scaled_by_a_power_of_two_has_the_same_plan_digit_by_digit(solved):
+    for case, result in solved[:3]:
+        similarity = Similarity(scale=2.0**-7)
+        again, _ = laws.timed_plan(similarity.case(case), "auto", 30.0 * BUDGET)
+        laws.digit_by_digit(result, again, similarity)
+
+
+def test_a_motion_is_valid_in_whatever_order_the_walls_are_listed(solved):
+    for number, (case, result) in enumerate(solved):
+        ordered = laws.replace_maze(case, in_other_order(case.maze, np.random.default_rng(number)))
+        assert not np.array_equal(ordered.maze.walls, case.maze.walls)
+        laws.stays_valid(result.motion, ordered.maze, ordered, "walls in other order")
 
 
 def test_a_planted_shift_of_one_joint_breaks_a_law(solved):
