@@ -32,7 +32,6 @@ from hrsnake_env.arm import FEEDER_RELEASE, ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from planners.beams import Beams
-from planners.checking import Late
 from planners.clock import now
 from planners.kernels import beam_arm as kernel
 from planners.kernels.beam_arm import (
@@ -57,6 +56,7 @@ from planners.kernels.beam_types import AXIS, BEAM, CORNER, EDGE, LINK, PATH, TA
 from planners.kernels.types import FloatArray, IntArray
 from planners.problem import Candidate, Failure, Motion, PlanningStatus
 from planners.query import Query
+from planners.room import TooLarge, most_poses
 from planners.survey import Geometry
 
 __all__ = [
@@ -119,6 +119,9 @@ TURN = 12.0
 STOP = 0.5
 """The motion ends when the tip is this near to the goal, in goal radii."""
 
+OF_THE_TIP = (kernel.GOAL, kernel.TOO_LONG, kernel.FULL)
+"""Endings of a run whose place is the tip's."""
+
 CHOICES = {AXIS: "axis", TANGENT: "tangent", EDGE: "edge side", PATH: "path point"}
 """What a link does, by its number in the record of a run."""
 
@@ -172,7 +175,7 @@ def plan_beam(query: Query, rules: Rules = CLAMPED) -> Candidate:
     Parameters
     ----------
     query : Query
-        Maze, arm and terms; no warm start is used, and one run takes milliseconds, so no deadline either.
+        Maze, arm and terms; no warm start is used.
     rules : Rules
         Which rules are followed.
 
@@ -191,11 +194,11 @@ def plan_beam(query: Query, rules: Rules = CLAMPED) -> Candidate:
     query.tell("plan", 1.0)
     if run.ending != kernel.GOAL:
         return Candidate(
-            status=PlanningStatus.DEAD_END,
+            status=PlanningStatus.OUT_OF_TIME if run.ending == kernel.FULL else PlanningStatus.DEAD_END,
             reason=run.reason(query.maze),
             failure=Failure(
                 place=run.place,
-                link=None if run.ending == kernel.TOO_LONG else run.link,
+                link=None if run.ending in OF_THE_TIP else run.link,
                 joints=run.motion(query.maze).joints[-1],
             ),
             timings={**geometry.timings, "plan": clock[1] - clock[0]},
@@ -226,10 +229,10 @@ class BeamRun:
     record : array, shape (n or 0, m, 5)
         What each link does, in the columns of `planners.kernels.beam_types`.
     ending, link : int
-        How it ended, one of GOAL, TOO_LONG, NO_GAP and JUMP of `planners.kernels.beam_arm`, and the link at
-        which it did.
+        How it ended, one of GOAL, TOO_LONG, NO_GAP, JUMP and, out of time, FULL of
+        `planners.kernels.beam_arm`, and the link at which it did.
     place : tuple of two floats
-        Start of that link, in maze units; the tip at the goal.
+        Start of that link where it found no way, otherwise the tip, in maze units.
     """
 
     link_length: float
@@ -261,6 +264,8 @@ class BeamRun:
             return (
                 f"With its base-side joint at {where}, {which} would have to jump to another free direction."
             )
+        if self.ending == kernel.FULL:
+            return f"Time was over with the tip at {where}."
         return f"All arm that the path can take is fed, and the tip is at {where}, not at the goal."
 
 
@@ -285,7 +290,7 @@ class FedArm:
         path, length = geometry.path, float(arm.link_length)
         # A joint track that swings from wall to wall is longer than the path, but never by this much.
         n_links = math.ceil(1.6 * path.length / length) + 4
-        n_max = 6 * POSES_PER_LINK * n_links
+        n_max = min(6 * POSES_PER_LINK * n_links, most_poses(n_links))
         self.geometry, self.link_length, self._walls = geometry, length, geometry.maze.walls
         self.way, self.terms = way_of(geometry), terms_of(geometry, arm, rules)
         self.feeds, self.headings = np.empty(n_max), np.empty((n_max, n_links))
@@ -296,7 +301,13 @@ class FedArm:
         self._progress = np.array([1, 0, kernel.TICKS])
 
     def feed(self, n_poses: int | None = None) -> tuple[int, int]:
-        """Feed the arm by so many poses, or to the end; return ending and link as `feed_arm` does."""
+        """Feed the arm by so many poses, or to the end; return ending and link as `feed_arm` does.
+
+        Raises
+        ------
+        TooLarge
+            If the poses take more memory than a motion may.
+        """
         maze, room = self.geometry.maze, len(self.feeds)
         ending, link = kernel.feed_arm(
             self.way,
@@ -315,7 +326,11 @@ class FedArm:
             self.headings,
             self.record,
         )
-        return (kernel.TOO_LONG if ending == kernel.FULL and self.n_poses == room else ending), link
+        if ending == kernel.FULL and self.n_poses == room:
+            if room == most_poses(len(self.links) - 1):
+                raise TooLarge((float(self.links[0].x), float(self.links[0].y)), room, len(self.links) - 1)
+            ending = kernel.TOO_LONG
+        return ending, link
 
     @property
     def n_poses(self) -> int:
@@ -344,21 +359,21 @@ def run_beam(
     record : bool
         Whether what each link does is recorded.
     deadline : float
-        On the clock of `planners.clock.now`.
+        When to stop, on the clock of `planners.clock.now`; the run ends with FULL then.
 
     Raises
     ------
-    Late
-        If time is over before the arm has come to its end.
+    TooLarge
+        If its poses take more memory than a motion may.
     """
     fed = FedArm(geometry, arm, rules, record=record)
     ending, link = fed.feed(AT_A_TIME)
     while ending == kernel.FULL:
         if now() > deadline:
-            raise Late
+            break
         ending, link = fed.feed(AT_A_TIME)
     n = fed.n_poses
-    at = fed.links[0 if ending in (kernel.GOAL, kernel.TOO_LONG) else link + 1]
+    at = fed.links[0 if ending in OF_THE_TIP else link + 1]
     return BeamRun(
         link_length=fed.link_length,
         feeds=fed.feeds[:n],

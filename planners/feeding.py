@@ -12,6 +12,7 @@ from planners.kernels import feeding as kernel
 from planners.kernels.feeding_sweep import Sweep, sweep_chords
 from planners.kernels.types import FloatArray
 from planners.problem import Motion
+from planners.room import TooLarge, most_poses
 
 __all__ = ["LATE", "STEP", "Feeding", "feed", "motion_along", "motion_of"]
 
@@ -89,6 +90,11 @@ def feed(
         of them or itself. That is before the first pose if chords that end at points of the track do.
     deadline : float
         When to stop, on the clock of `planners.clock.now`.
+
+    Raises
+    ------
+    TooLarge
+        If the poses take more memory than a motion may.
     """
     # About the base: far from the origin, rounding would be more than links are exact to.
     base, heading = kernel.feeder_axis(base_pose)
@@ -105,8 +111,9 @@ def feed(
     if n_links < 0:
         n_links = math.floor(arc[-1] / link_length) + 2
     most = MOST_POSES_PER_LINK * n_links
+    allowed = min(most, most_poses(n_links, track.shape[1]))
     chunk = max(1, CHUNK // (n_links + 1))
-    room = min(POSES_PER_LINK * n_links, ROOM // (n_links + 1) + 1)
+    room = min(POSES_PER_LINK * n_links, ROOM // (n_links + 1) + 1, allowed)
     poses = np.empty((room, n_links + 1, track.shape[1]))
     state, segments = np.zeros(5), np.zeros((2, n_links + 1), dtype=np.int64)
     places, n, ending = np.zeros((2, n_links + 1)), 0, kernel.FULL
@@ -114,8 +121,10 @@ def feed(
         if n > 0 and now() >= deadline:
             ending = LATE
             break
+        if n == allowed:
+            raise TooLarge(tuple((poses[n - 1, -1] + base).tolist()), n, n_links)
         if n == room:
-            room = min(2 * room, most)
+            room = min(2 * room, allowed)
             more = np.empty((room, *poses.shape[1:]))
             more[:n] = poses
             poses = more

@@ -31,6 +31,7 @@ from planners.problem import (
 )
 from planners.query import Query
 from planners.rod_bound import Passage, rod_passes
+from planners.room import TooLarge
 from planners.sweep_planner import longest_past, plan_sweep
 from planners.track_planner import plan_track
 from planners.validation import validate
@@ -253,6 +254,13 @@ def _answer(question: Question, checker: Checker[Motion]) -> PlanningResult:
             planner=name,
             reason="Time was over before the exact check of a motion was.",
             failure=None if checker.asked is None else Failure(place=_end_of(checker.asked)),
+        )
+    except TooLarge as error:
+        return PlanningResult(
+            status=PlanningStatus.DEAD_END,
+            planner=name,
+            reason=str(error),
+            failure=Failure(place=error.place),
         )
     timings = {**candidate.timings, "validate": checker.seconds}
     if report.valid:

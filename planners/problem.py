@@ -16,7 +16,7 @@ from hrsnake_env.arm import ArmSpec, FloatArray, configuration_from_joints, join
 from hrsnake_env.errors import InputError
 from hrsnake_env.files import replacing
 from hrsnake_env.maze import Maze
-from planners.reading import NotReadable, read_arrays
+from planners.reading import MOTION_BYTES, NotReadable, read_arrays
 
 __all__ = [
     "Attempt",
@@ -239,7 +239,7 @@ def read_motion_arrays(path: str | os.PathLike[str]) -> dict[str, Any]:
         If the file is missing or does not hold a motion.
     """
     try:
-        return motion_values(read_arrays(path), f" in '{path}'")
+        return motion_values(read_arrays(path, most_bytes=MOTION_BYTES), f" in '{path}'")
     except FileNotFoundError:
         raise InputError(f"Expected a motion file at '{path}', but there is none.") from None
     except NotReadable as got:

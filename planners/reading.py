@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "ARRAY_BYTES",
+    "MOTION_BYTES",
     "TEXT_BYTES",
     "NotReadable",
     "check_archive",
@@ -26,7 +27,10 @@ __all__ = [
 ]
 
 ARRAY_BYTES = 256 * 2**20
-"""That the arrays of a motion or a policy may take when they are unpacked."""
+"""That the arrays of a policy, or of a motion from elsewhere, may take when they are unpacked."""
+
+MOTION_BYTES = 2 * 2**30
+"""That a motion may take: planners make none that is larger, and files hold none."""
 
 TEXT_BYTES = 32 * 2**20
 """Of a text file: its lists and numbers take many times as much memory."""

@@ -16,6 +16,7 @@ from planners.corners import Corner
 from planners.kernels import sweep as kernel
 from planners.kernels.types import FloatArray, IntArray
 from planners.problem import Motion
+from planners.room import TooLarge, most_poses
 from planners.survey import Geometry
 
 __all__ = ["Fineness", "Track", "aim_line", "grow", "motion_of"]
@@ -247,13 +248,22 @@ def _common(track: Track, earlier: Track, s: FloatArray, length: float) -> int:
 
 
 def motion_of(track: Track, length: float, maze: Maze, deadline: float = math.inf) -> Motion | None:
-    """Make poses of a track, thinned to the largest step of its fineness; None if time is over before."""
+    """Make poses of a track, thinned to the largest step of its fineness; None if time is over before.
+
+    Raises
+    ------
+    TooLarge
+        If the poses take more memory than a motion may.
+    """
     per_link, step = track.fineness.per_link, track.fineness.step * length
     kept = np.empty(track.n, dtype=np.int64)
     most = 8.0 * track.fineness.deviation
     n_kept = kernel.thin_track(track.n, track.points, track.start, track.headings, per_link, step, most, kept)
     kept = kept[:n_kept]
     n_links = max(1, kernel.chain_length(int(kept[-1]), track.start, per_link))
+    if n_kept > most_poses(n_links):
+        x, y = (float(value) for value in track.points[track.n - 1])
+        raise TooLarge((x, y), n_kept, n_links)
     joints, feed = np.empty((n_kept, n_links + 1, 2)), np.empty(n_kept)
     angles, before = np.empty((n_kept, n_links)), np.zeros((1, n_links))
     rows = max(1, POSED // n_links)

@@ -6,18 +6,21 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely.geometry import Polygon, box
+from shapely.geometry import LineString, Point, Polygon, box
 from strategies import cases, similarities
 
 from benchmarks.trust import maze_laws as laws
-from benchmarks.trust.maze_draws import draw_case, with_far_part, with_far_walls
+from benchmarks.trust.maze_draws import Similarity, draw_case, in_other_order, with_far_part, with_far_walls
 from hrsnake_env.arm import ArmSpec
+from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
 from hrsnake_env.mazes import fig19, serpentine
 from planners import PLANNERS, PlanningStatus, plan
 from planners.clock import now
 from planners.feeding import LATE, feed
 from planners.problem import Motion
+from planners.room import most_poses
+from planners.track_scene import Scene
 from planners.validation import validate
 
 FEW = settings(max_examples=8)
@@ -83,6 +86,20 @@ def test_another_part_of_the_free_space_changes_no_digit_of_a_plan(solved):
         np.testing.assert_array_equal(again.motion.joints, result.motion.joints)
 
 
+def test_a_maze_scaled_by_a_power_of_two_has_the_same_plan_digit_by_digit(solved):
+    for case, result in solved[:3]:
+        similarity = Similarity(scale=2.0**-7)
+        again, _ = laws.timed_plan(similarity.case(case), "auto", 30.0 * BUDGET)
+        laws.digit_by_digit(result, again, similarity)
+
+
+def test_a_motion_is_valid_in_whatever_order_the_walls_are_listed(solved):
+    for number, (case, result) in enumerate(solved):
+        ordered = laws.replace_maze(case, in_other_order(case.maze, np.random.default_rng(number)))
+        assert not np.array_equal(ordered.maze.walls, case.maze.walls)
+        laws.stays_valid(result.motion, ordered.maze, ordered, "walls in other order")
+
+
 def test_a_planted_shift_of_one_joint_breaks_a_law(solved):
     case, result = solved[0]
     joints = result.motion.joints.copy()
@@ -91,26 +108,30 @@ def test_a_planted_shift_of_one_joint_breaks_a_law(solved):
         laws.stays_valid(dataclasses.replace(result.motion, joints=joints), case.maze, case, "shifted")
 
 
-@pytest.mark.parametrize("planner", ["auto", "track", "outer-wall"])
+@pytest.mark.parametrize("planner", ["track", "outer-wall"])
 def test_the_wall_in_the_way_of_thick_links_is_a_wall_of_the_maze(planner):
     # Walls grown by the radius have more vertices, and so other numbers.
     maze, arm = fig19(), ArmSpec(link_length=425.0, link_radius=40.0)
     result = plan(maze, arm, planner, explain=False, time_budget=4.0)
     assert not result.solved
-    wall = result.failure.wall
-    assert wall is None or wall < len(maze.walls)
+    assert 0 <= result.failure.wall < len(maze.walls)
+    aim, wall = np.asarray(result.place), maze.walls[result.failure.wall]
+    away = [LineString(segment).distance(Point(aim)) for segment in maze.walls]
+    assert LineString(wall).distance(Point(aim)) == min(away)
 
 
-@pytest.mark.parametrize("size", [1e-13, 1e-14])
-def test_walls_without_length_stop_no_planner(size):
+@pytest.mark.parametrize("size", [2e-13, 1e-13])
+def test_walls_without_length_are_no_walls_of_a_track_s_scene(size):
     # Unions of outlines leave such walls where edges of both meet.
     outline = np.array([(0, 0), (0, 900), (700, 900), (700, 700), (200, 700), (200, 0)], dtype=float)
-    doubled = np.insert(outline, 4, outline[3] - (0.0, size * 700.0), axis=0)
+    doubled = np.insert(outline, 4, outline[3] - size * 700.0, axis=0)
     maze = dataclasses.replace(
         Maze.from_corridors([(100, 0), (100, 800), (700, 800)], 200.0), free_space=Polygon(doubled)
     )
-    for planner in ("track", "sweep", "beam", "follow"):
-        assert plan(maze, ArmSpec(link_length=250.0), planner, time_budget=4.0).reason is not None
+    assert len(maze.walls) == 7
+    near = Scene(maze=maze, length=250.0, joint_limit=np.inf).near
+    assert len(near.walls) == 6
+    np.testing.assert_allclose(np.hypot(*near.outward.T), 1.0)
 
 
 def test_feeding_goes_on_where_it_was_full(monkeypatch):
@@ -168,3 +189,41 @@ def test_a_check_tells_before_it_looks_at_the_first_pose():
     )
     validate(motion, maze, progress=lambda stage, share: told.append(share))
     assert told[0] == 0.0 and told == sorted(told)
+
+
+LONGEST_ARM = 1.1e-3
+"""Link length in sizes of the maze: hardly more than the shortest that is planned for."""
+
+POSING = ("track", "sweep", "beam", "as-printed", "follow", "backbone")
+
+
+@pytest.mark.parametrize("planner", ["beam", "as-printed"])
+def test_rules_that_run_out_of_time_with_thousands_of_links_have_a_reason_and_a_place(planner):
+    maze = fig19()
+    case = laws.Case(kind="fig19", maze=maze, arm=ArmSpec(link_length=LONGEST_ARM * maze.size))
+    result, _ = laws.timed_plan(case, planner, 0.2)
+    laws.says_why(case, planner, result)
+    assert result.status is PlanningStatus.OUT_OF_TIME
+
+
+@pytest.mark.parametrize("planner", [*POSING, "auto"])
+def test_a_motion_that_would_fill_the_memory_is_refused_with_a_place(planner, monkeypatch):
+    monkeypatch.setattr("planners.room.MOTION_BYTES", 20_000)
+    case = laws.Case(kind="fig19", maze=fig19(), arm=ArmSpec(link_length=200.0))
+    result, _ = laws.timed_plan(case, planner, 20.0)
+    laws.says_why(case, planner, result)
+    assert not result.solved and "Longer links take less" in result.reason
+
+
+def test_files_hold_whatever_motions_are_made(solved, tmp_path, monkeypatch):
+    _, result = solved[0]
+    motion, path = result.motion, tmp_path / "motion.npz"
+    motion.save(path)
+    taken = motion.joints.nbytes + motion.joint_angles.nbytes + motion.feed.nbytes
+    monkeypatch.setattr("planners.room.MOTION_BYTES", taken)
+    assert most_poses(motion.n_links) == motion.n_poses
+    monkeypatch.setattr("planners.problem.MOTION_BYTES", taken + 4096)
+    assert Motion.load(path).n_poses == motion.n_poses
+    monkeypatch.setattr("planners.problem.MOTION_BYTES", taken)
+    with pytest.raises(InputError):
+        Motion.load(path)

@@ -22,7 +22,16 @@ from hrsnake_env.maze import Maze
 from hrsnake_env.random_mazes import random_maze
 from planners.problem import Motion
 
-__all__ = ["KINDS", "Case", "Similarity", "draw_case", "draw_similarity", "with_far_part", "with_far_walls"]
+__all__ = [
+    "KINDS",
+    "Case",
+    "Similarity",
+    "draw_case",
+    "draw_similarity",
+    "in_other_order",
+    "with_far_part",
+    "with_far_walls",
+]
 
 DRAWS = 50
 """How often a maze is drawn until it is a valid one."""
@@ -144,6 +153,18 @@ def with_far_part(maze: Maze, draws) -> Maze:
     x, y = x_max + draws.uniform(0.1, 3.0) * maze.size, y_max
     part = box(x, y, x + draws.uniform(0.05, 1.0) * maze.size, y + 0.3 * maze.size)
     return dataclasses.replace(maze, free_space=MultiPolygon([maze.free_space, part]))
+
+
+def in_other_order(maze: Maze, draws) -> Maze:
+    """Return the same maze with its walls in another order: rings begin elsewhere, holes come backward."""
+
+    def turned(ring):
+        points = np.asarray(ring.coords)[:-1]
+        return np.roll(points, int(draws.integers(1, len(points))), axis=0)
+
+    space = maze.free_space
+    holes = [turned(hole) for hole in space.interiors]
+    return dataclasses.replace(maze, free_space=Polygon(turned(space.exterior), holes[::-1]))
 
 
 def _arm(draws, maze: Maze) -> ArmSpec:

@@ -1,7 +1,18 @@
 """Plan random mazes, and check every law of `maze_laws` on each.
 
 Run from the repository's root with `python -m benchmarks.trust.mazes --count 1000 --seed 0`. `auto` is asked
-in each maze, and one other planner in turn. Any case is planned again with `--only NUMBER` and the same seed.
+in each maze, and one other planner in turn. What must hold, and what may come
+out otherwise:
+
+- A motion is valid in the maze that is moved, turned, mirrored or scaled with it, and with far walls.
+- A maze scaled by a power of two has the same plan, digit by digit: no length is absolute.
+- Turned, mirrored or shifted, a maze may have another plan, or none: the grid of the potential is along x and
+  y, and rounding is another. So it may where the walls are listed in another order, as sums then round
+  otherwise: mostly by 1e-14 link lengths, rarely so that another planner of `auto` is the first to succeed.
+  Both motions are valid. This is counted as "other answers".
+- Another part of the free space leaves the walls in their order, and so changes no digit.
+
+Any case is planned again with `--only NUMBER` and the same seed.
 Ends with one line per law, and with 1 if a fault was found.
 """
 
@@ -19,15 +30,22 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.trust import maze_laws as laws
-from benchmarks.trust.maze_draws import draw_case, draw_similarity, with_far_part, with_far_walls
+from benchmarks.trust.maze_draws import (
+    Similarity,
+    draw_case,
+    draw_similarity,
+    in_other_order,
+    with_far_part,
+    with_far_walls,
+)
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.maze import Maze
 from planners.bench.pool import bar
 from planners.planning import PLANNERS, plan
 
 RESULTS = Path(__file__).parents[1] / "results" / "trust"
-TIME_BUDGET, LATE = 1.0, 1.0
-"""Seconds for each plan, and how much later it may end."""
+TIME_BUDGET = 1.0
+"""Seconds for each plan."""
 
 
 class Tally:
@@ -36,6 +54,7 @@ class Tally:
     def __init__(self) -> None:
         self.cases: Counter[str] = Counter()
         self.statuses: Counter[str] = Counter()
+        self.others: list[dict[str, str | int]] = []
         self.faults: list[dict[str, str | int]] = []
         self.seconds: list[float] = []
 
@@ -51,14 +70,11 @@ class Tally:
         return None
 
     def _note(self, number: int, law: str, message: str) -> None:
-        self.faults.append({"number": number, "law": law, "message": message})
-        print(f"\nfault in case {number}: {law}: {message}", flush=True)
-
-
-def on_time(seconds: float) -> None:
-    """Check how long planning took."""
-    if seconds > TIME_BUDGET + LATE:
-        raise laws.Broken(f"{seconds:.1f} s with a budget of {TIME_BUDGET:g} s")
+        what = "other answer" if law in laws.MAY_DIFFER else "fault"
+        (self.others if law in laws.MAY_DIFFER else self.faults).append(
+            {"number": number, "law": law, "message": message}
+        )
+        print(f"\n{what} in case {number}: {law}: {message}", flush=True)
 
 
 def one_case(seed: int, number: int, tally: Tally, folder: Path) -> None:
@@ -74,7 +90,7 @@ def one_case(seed: int, number: int, tally: Tally, folder: Path) -> None:
         result, seconds = answer
         tally.seconds.append(seconds)
         tally.statuses[f"{'auto' if planner == 'auto' else 'others'}: {result.status}"] += 1
-        tally.check(number, "time", on_time, seconds)
+        tally.check(number, "time", laws.on_time, seconds, TIME_BUDGET)
         tally.check(number, "reason", laws.says_why, case, planner, result)
         if result.motion is not None:
             tally.check(number, "saved", laws.valid_when_saved, case, result.motion, folder / f"{number}.npz")
@@ -92,16 +108,36 @@ def one_case(seed: int, number: int, tally: Tally, folder: Path) -> None:
         tally.check(number, "cut", laws.valid_when_cut, case, motion, n_poses)
     moved = similarity.case(case)
     far = laws.replace_maze(case, walls(case.maze, draws))
+    twofold = Similarity(scale=2.0 ** int(draws.integers(-9, 14)))
+    ordered = laws.replace_maze(case, in_other_order(case.maze, draws))
+    if solved.motion is not None:
+        tally.check(
+            number,
+            "far walls",
+            laws.stays_valid,
+            solved.motion,
+            ordered.maze,
+            ordered,
+            "walls in other order",
+        )
     if solved.motion is not None:
         tally.check(
             number, "far walls", laws.stays_valid, solved.motion, far.maze, far, "with far walls", {"goal"}
         )
-    for law, other in (("moved plan", moved), ("far walls", far)):
+    for law, other in (
+        ("moved plan", moved),
+        ("far walls", far),
+        ("wall order", ordered),
+        ("scaled plan", twofold.case(case)),
+    ):
         answer = tally.check(number, "exception", laws.timed_plan, other, "auto", TIME_BUDGET)
         if answer is not None:
-            tally.check(number, "time", on_time, answer[1])
+            tally.check(number, "time", laws.on_time, answer[1], TIME_BUDGET)
             tally.seconds.append(answer[1])
-            what = str(similarity) if law == "moved plan" else walls.__name__
+            if law == "scaled plan":
+                tally.check(number, law, laws.digit_by_digit, solved, answer[0], twofold)
+                continue
+            what = {"moved plan": str(similarity), "far walls": walls.__name__}.get(law, law)
             tally.check(number, law, laws.still_solved, solved, answer[0], what)
 
 
@@ -133,12 +169,13 @@ def main() -> int:
 def report(seed: int, done: int, tally: Tally, seconds: float) -> int:
     """Print and write what was found; return 1 if that is any fault."""
     by_law = Counter(fault["law"] for fault in tally.faults)
+    other = Counter(answer["law"] for answer in tally.others)
     late = np.array(tally.seconds or [0.0])
     for law, meaning in laws.LAWS.items():
-        print(f"{law}: {meaning}: {tally.cases[law]} cases, {by_law[law]} faults")
+        print(f"{law}: {meaning}: {tally.cases[law]} cases, {by_law[law]} faults, {other[law]} other answers")
     print(f"outcomes: {dict(sorted(tally.statuses.items()))}")
     median, slow, most = np.quantile(late, (0.5, 0.99, 1.0))
-    print(f"seconds per plan: median {median:.2f}, 99 % {slow:.2f}, most {most:.2f}")
+    print(f"seconds of the processor per plan: median {median:.2f}, 99 % {slow:.2f}, most {most:.2f}")
     print(f"{done} mazes with seed {seed} in {seconds:.0f} s, {len(tally.faults)} faults")
     (RESULTS / "mazes.json").write_text(
         json.dumps(
@@ -149,6 +186,7 @@ def report(seed: int, done: int, tally: Tally, seconds: float) -> int:
                 "cases": tally.cases,
                 "statuses": tally.statuses,
                 "faults": tally.faults,
+                "other_answers": tally.others,
                 "most_seconds": float(late.max()),
                 "versions": {
                     "python": platform.python_version(),

@@ -29,6 +29,7 @@ from planners.kernels.types import FloatArray
 from planners.path import arclength, resampled, tangents, windowed
 from planners.problem import Candidate, Motion
 from planners.query import Query
+from planners.room import TooLarge, most_poses
 from planners.survey import Geometry
 
 __all__ = ["backbone_curve", "plan_backbone"]
@@ -106,8 +107,9 @@ def _led(query: Query, curve: FloatArray) -> Trial | None:
     along, axis = tangents(curve), float(maze.base_pose[2])
     normals = np.column_stack([-along[:, 1], along[:, 0]])
     n_links = math.ceil(MORE_LINKS * arclength(curve)[-1]) + 2
-    room = 4 * n_links * kernel.TICKS // kernel.STRIDE
-    feeds, headings = np.zeros(room, dtype=np.int64), np.full((room, n_links), axis)
+    room = min(4 * n_links * kernel.TICKS // kernel.STRIDE, most_poses(n_links))
+    feeds, headings = np.zeros(room, dtype=np.int64), np.empty((room, n_links))
+    headings[0] = axis  # later rows begin as copies: to fill all would take seconds for a long arm
     joints, nearest = np.zeros((n_links + 1, 2)), np.zeros((n_links, kernel.SAMPLES), dtype=np.int64)
     goal, stop = (maze.goal - maze.base_pose[:2]) / length, STOP * maze.goal_radius / length
     n, ending = 1, kernel.PAUSED
@@ -118,6 +120,9 @@ def _led(query: Query, curve: FloatArray) -> Trial | None:
             curve, normals, axis, goal, stop, FEEDER_RELEASE, STEP, n, n + CHUNK,
             feeds, headings, joints, nearest,
         )  # fmt: skip
+    if ending == kernel.FULL and room == most_poses(n_links):
+        x, y = (float(value) for value in maze.base_pose[:2] + length * joints[0])
+        raise TooLarge((x, y), n, n_links)
     if ending == kernel.PAST:
         motion = _motion(feeds[:n], headings[:n], maze.base_pose, length)
         away = np.hypot(*(motion.joints[:, -1] - maze.goal).T)
