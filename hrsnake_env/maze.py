@@ -83,14 +83,14 @@ class Maze:
         for role, point in (("base", base), ("goal", tip)):
             if not any(part.contains(point) for part in parts):
                 raise InputError(
-                    f"Expected the {role} inside the free space, got ({point.x:g}, {point.y:g}), "
+                    f"Expected the {role} inside the free space, got ({point.x:.12g}, {point.y:.12g}), "
                     f"which is on or behind a wall."
                 )
         part = next(part for part in parts if part.contains(base))
         if not part.contains(tip):
             raise InputError(
-                f"Expected a free way from the base to the goal, but ({tip.x:g}, {tip.y:g}) lies in "
-                f"another part of the free space than ({base.x:g}, {base.y:g})."
+                f"Expected a free way from the base to the goal, but ({tip.x:.12g}, {tip.y:.12g}) lies in "
+                f"another part of the free space than ({base.x:.12g}, {base.y:.12g})."
             )
         if base.distance(tip) <= self.goal_radius:
             raise InputError(

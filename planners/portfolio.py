@@ -7,8 +7,6 @@ import itertools
 from collections.abc import Iterator
 from typing import NamedTuple
 
-import numpy as np
-
 from planners.kernels.types import FloatArray
 from planners.problem import Motion
 from planners.query import Query

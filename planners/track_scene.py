@@ -108,7 +108,7 @@ class Scene:
 
 
 def _without_repeats(ring: FloatArray) -> FloatArray:
-    return ring[(ring != np.roll(ring, 1, axis=0)).any(axis=1)]
+    return np.asarray(ring[(ring != np.roll(ring, 1, axis=0)).any(axis=1)])
 
 
 def _outward(ring: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -1,5 +1,6 @@
 """Degenerate geometry is refused in one sentence or answered right, wherever it lies and however large."""
 
+import re
 import warnings
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from shapely.geometry import Polygon
 
 from benchmarks.trust.degenerate import look_everywhere
+from hrsnake_env.arguments import length_text
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
@@ -104,6 +106,24 @@ def test_a_maze_comes_back_from_its_file_with_the_same_walls():
         free_space=Polygon([p for pair in zip(ring, beside, strict=True) for p in pair]).buffer(0)
     )
     assert (Maze.from_geojson(maze.to_geojson()).walls == maze.walls).all()
+
+
+@pytest.mark.parametrize("planner", ["track", "sweep", "beam"])
+@pytest.mark.parametrize(("scale", "offset"), [(1e-3, 0.0), (1e-5, 3.0), (1.0, 0.0), (1e3, 0.0)])
+def test_a_reason_tells_places_as_finely_as_the_maze_is_small(planner, scale, offset):
+    maze = placed(Maze.load("fig19"), scale, offset)
+    result = plan(maze, ArmSpec(link_length=500.0 * scale), planner)
+    told = re.search(r"\(([-\d.]+), ([-\d.]+)\)", result.reason)
+    off = np.array([float(figure) for figure in told.groups()]) - result.place
+    if "seen from the base" in result.reason:
+        off += maze.base_pose[:2]
+    assert np.abs(off).max() <= 1e-4 * maze.size
+
+
+@pytest.mark.parametrize("size", [1e-30, 1e-9, 2e-3, 1.0, 2e3, 9.99e5, 1e30])
+@pytest.mark.parametrize("share", [-1.0, -0.123456, -1e-6, 0.0, 1e-3, 0.5, 7.7])
+def test_a_length_is_told_to_a_ten_thousandth_of_the_size(size, share):
+    assert abs(float(length_text(share * size, size)) - share * size) <= 1e-4 * size
 
 
 def test_points_on_a_straight_wall_make_no_walls():

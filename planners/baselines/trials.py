@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from hrsnake_env.arguments import place_text
 from hrsnake_env.maze import Maze
 from planners.feeding import feed, motion_of
 from planners.kernels import feeding as kernel
@@ -120,11 +121,11 @@ def _answer(geometry: Geometry, begin: float, motion: Motion | None) -> Candidat
 
 
 def _dead_end(geometry: Geometry, begin: float, stuck: Stuck) -> Candidate:
-    x, y = (float(value) for value in stuck.joints[-1])
+    maze, (x, y) = geometry.maze, (float(value) for value in stuck.joints[-1])
     return Candidate(
         status=PlanningStatus.DEAD_END,
-        reason=f"With the tip at ({x:.1f}, {y:.1f}) {geometry.maze.units}, {stuck.why}.",
-        failure=Failure(place=(x, y), wall=wall_nearest_to(geometry.maze, (x, y)), joints=stuck.joints),
+        reason=f"With the tip at {place_text((x, y), maze.size)} {maze.units}, {stuck.why}.",
+        failure=Failure(place=(x, y), wall=wall_nearest_to(maze, (x, y)), joints=stuck.joints),
         timings=_timings(geometry, begin),
     )
 
