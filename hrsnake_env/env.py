@@ -13,7 +13,7 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from hrsnake_env import task
-from hrsnake_env.arguments import check_at_least, check_flag, check_one_of, is_number, numbers
+from hrsnake_env.arguments import check_at_least, check_flag, check_one_of, is_number, numbers, place_text
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.contacts import PinchReport
 from hrsnake_env.errors import InputError
@@ -540,7 +540,7 @@ class HyperRedundantMazeEnv(gym.Env[Any, Any]):
                 what = "a wall" if contact.other is None else f"link {contact.other}"
                 raise InputError(
                     f"Expected a start clear of the walls, got link {contact.link} {-contact.clearance:.3g} "
-                    f"{self.maze.units} deep in {what} at ({contact.point[0]:g}, {contact.point[1]:g})."
+                    f"{self.maze.units} deep in {what} at {place_text(contact.point, self.maze.size)}."
                 )
         if self._tally.tip_distance <= self.maze.goal_radius:
             raise InputError("Expected a start outside the goal's radius, got one with the tip at the goal.")

@@ -40,6 +40,9 @@ MAX_BYTES = 256 * 2**20
 LONGEST_NAME = 200
 """Characters of a maze's name and units; a file may have a book there."""
 
+SMALLEST, LARGEST = 1e-60, 1e60
+"""How small and how large a maze may be, in its units: beyond, products of lengths are no numbers."""
+
 MAZES: dict[str, Callable[[], Maze]] = {}
 """The builders of the named mazes, in the order in which they are listed; `hrsnake_env.mazes` fills it."""
 
@@ -96,14 +99,14 @@ class Maze:
         for role, point in (("base", base), ("goal", tip)):
             if not any(part.contains(point) for part in parts):
                 raise InputError(
-                    f"Expected the {role} inside the free space, got ({point.x:g}, {point.y:g}), "
+                    f"Expected the {role} inside the free space, got ({point.x:.12g}, {point.y:.12g}), "
                     f"which is on or behind a wall."
                 )
         part = next(part for part in parts if part.contains(base))
         if not part.contains(tip):
             raise InputError(
-                f"Expected a free way from the base to the goal, but ({tip.x:g}, {tip.y:g}) lies in "
-                f"another part of the free space than ({base.x:g}, {base.y:g})."
+                f"Expected a free way from the base to the goal, but ({tip.x:.12g}, {tip.y:.12g}) lies in "
+                f"another part of the free space than ({base.x:.12g}, {base.y:.12g})."
             )
         if base.distance(tip) <= self.goal_radius:
             raise InputError(
@@ -310,16 +313,26 @@ class Maze:
                 ]
             ),
             base_pose=np.array([*base, math.atan2(along[1], along[0])]),
-            goal=end + 0.5 * widths[-1] * back if goal is None else np.asarray(goal, dtype=np.float64),
+            goal=end + 0.5 * widths[-1] * back if goal is None else _frozen_array(goal, (2,), "goal (x, y)"),
             goal_radius=widths[-1] / 8 if goal_radius is None else goal_radius,
             units=units,
         )
 
 
+def _real_numbers(values: Any) -> FloatArray:
+    """Return an array of real numbers; raise ValueError for truth values, texts and ragged rows."""
+    array = np.asarray(values)
+    if not isinstance(values, np.ndarray) and array.dtype.kind in "biuf":  # numpy takes True for 1 in a list
+        array = np.asarray(values, dtype=object)
+    if array.dtype.kind not in "iuf" and not all(map(is_number, array.flat)):
+        raise ValueError("no real numbers")
+    return array.astype(np.float64)
+
+
 def _frozen_array(values: ArrayLike, shape_: tuple[int, ...], what: str) -> FloatArray:
     try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
+        array = _real_numbers(values)
+    except (TypeError, ValueError, OverflowError):
         array = np.empty(0)
     if array.shape != shape_ or not np.isfinite(array).all():
         raise InputError(f"Expected {what} as {shape_[0]} finite numbers, got {values!r}.")
@@ -336,6 +349,10 @@ def _checked_parts(free_space: Any) -> list[Polygon]:
         raise InputError("Expected a free space with an area, got an empty polygon.")
     if not np.abs(free_space.bounds).max() <= FARTHEST:
         raise InputError(f"Expected a free space with coordinates of at most {FARTHEST:g}, got larger ones.")
+    bounds = np.asarray(free_space.bounds)
+    if np.isfinite(bounds).all():
+        _check_extent(float(np.abs(bounds).max()))
+        _check_extent(float(np.abs(bounds[2:] - bounds[:2]).max()))
     if not free_space.is_valid:
         raise InputError(
             f"Expected a valid polygon as free space, got one with: {explain_validity(free_space)}."
@@ -451,33 +468,54 @@ def _number(feature: dict[str, Any], role: str, key: str) -> float:
 def _union(polygons: Sequence[Any]) -> Any:
     for polygon in polygons:
         _checked_parts(polygon)
-    # Buffers leave corners at 1e-13 beside their place; walls that should meet then do not.
-    return shapely.transform(shapely.union_all(polygons), lambda xy: np.round(xy, 9) + 0.0)
+    union = shapely.union_all(polygons)
+    # Buffers leave corners beside their place, by rounding; walls that should meet then do not.
+    decimals = 12 - math.floor(math.log10(np.abs(union.bounds).max()))
+    return shapely.transform(union, lambda xy: np.round(xy, decimals) + 0.0)
 
 
 def _as_centrelines(centrelines: ArrayLike | Sequence[ArrayLike]) -> list[FloatArray]:
     try:
-        single = np.asarray(centrelines, dtype=np.float64)
-        lines = [single] if single.ndim == 2 else list(single)
-    except ValueError:  # corridors with different numbers of waypoints
-        lines = [np.asarray(line, dtype=np.float64) for line in centrelines]  # type: ignore[union-attr]
+        lines = _lines_of(centrelines)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(
+            "Expected centrelines as lists of waypoints (x, y) in numbers, got others."
+        ) from None
     if not lines:
         raise InputError("Expected at least one centreline, got none.")
     for line in lines:
         if line.ndim != 2 or line.shape[1] != 2 or len(line) < 2 or not np.isfinite(line).all():
             raise InputError(f"Expected each centreline with shape (n >= 2, 2), got {line.shape}.")
+        _check_extent(float(np.abs(line).max()))
+        _check_extent(float(np.ptp(line, axis=0).max()))
     return lines
+
+
+def _lines_of(centrelines: Any) -> list[FloatArray]:
+    try:
+        single = _real_numbers(centrelines)
+    except ValueError:  # corridors with different numbers of waypoints
+        return [_real_numbers(line) for line in centrelines]
+    return [single] if single.ndim == 2 else list(single)
+
+
+def _check_extent(extent: float) -> None:
+    """Refuse what has no squares in double precision; nothing at all is refused elsewhere."""
+    if extent > 0.0 and not SMALLEST <= extent <= LARGEST:
+        raise InputError(f"Expected a maze between {SMALLEST:g} and {LARGEST:g} in size, got {extent:g}.")
 
 
 def _as_widths(width: Any, n: int) -> list[float]:
     try:
-        widths = np.broadcast_to(np.asarray(width, dtype=np.float64), n).tolist()
-    except (TypeError, ValueError):
+        widths = np.broadcast_to(_real_numbers(width), n).tolist()
+    except (TypeError, ValueError, OverflowError):
         raise InputError(
             f"Expected a corridor width, or one for each of {n} centrelines, got {width!r}."
         ) from None
     if not all(math.isfinite(value) and value > 0.0 for value in widths):
         raise InputError(f"Expected a positive, finite corridor width, got {width!r}.")
+    for value in widths:
+        _check_extent(value)
     return [float(value) for value in widths]
 
 

@@ -28,6 +28,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hrsnake_env.arguments import place_text
 from hrsnake_env.arm import FEEDER_RELEASE, ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
@@ -256,7 +257,7 @@ class BeamRun:
 
     def reason(self, maze: Maze) -> str:
         """Say in one sentence where and why it ended short of the goal."""
-        where = f"({self.place[0]:.1f}, {self.place[1]:.1f}) {maze.units}"
+        where = f"{place_text(self.place, maze.size)} {maze.units}"
         which = "the tip's link" if self.link == 0 else f"link {self.link + 1} from the tip"
         if self.ending == kernel.NO_GAP:
             return f"With its base-side joint at {where}, {which} has no free direction."

@@ -311,12 +311,12 @@ def _rows(reading: MapReading, maze: Maze | None) -> Rows:
     if base is None:
         yield "base", "not said: give --base X,Y,DEG"
     else:
-        yield "base", f"({base['x']:.6g}, {base['y']:.6g}), heading {base['heading_deg']:.4g} degrees"
+        yield "base", f"({base['x']:.12g}, {base['y']:.12g}), heading {base['heading_deg']:.4g} degrees"
     if goal is None:
         yield "goal", "not said: give --goal X,Y"
     else:
         radius = "" if goal["radius"] is None else f", radius {goal['radius']:.4g} {units}"
-        yield "goal", f"({goal['x']:.6g}, {goal['y']:.6g}){radius}"
+        yield "goal", f"({goal['x']:.12g}, {goal['y']:.12g}){radius}"
     if maze is not None:
         yield (
             "straight way",

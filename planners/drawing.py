@@ -13,6 +13,7 @@ from matplotlib.animation import PillowWriter
 from matplotlib.image import imsave
 
 from hrsnake_env.appearance import COLOURS
+from hrsnake_env.arguments import length_text, place_text
 from hrsnake_env.arm import ArmSpec, FloatArray
 from hrsnake_env.contacts import PINCH_TOLERANCE
 from hrsnake_env.errors import InputError
@@ -233,9 +234,9 @@ def _why(maze: Maze, arm: ArmSpec, result: PlanningResult) -> Iterator[str]:
     yield "dashed: path to the goal"
     if failure is None:
         return
-    yield f"ring: ({failure.place[0]:.0f}, {failure.place[1]:.0f}) {units}"
+    yield f"ring: {place_text(failure.place, maze.size)} {units}"
     if failure.path_position is not None:
-        yield f"   {failure.path_position:.0f} {units} along the path"
+        yield f"   {length_text(failure.path_position, maze.size)} {units} along the path"
     if failure.wall is not None:
         yield "red: the wall that is in the way"
     if failure.depth is not None:

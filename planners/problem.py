@@ -191,7 +191,7 @@ class Motion:
         """
         if not np.allclose(self.base_pose, maze.base_pose, rtol=0.0, atol=1e-9 * self.link_length):
             mine, others = (
-                f"({x:g}, {y:g}, {np.degrees(heading):g} deg)"
+                f"({x:.12g}, {y:.12g}, {np.degrees(heading):g} deg)"
                 for x, y, heading in (self.base_pose, maze.base_pose)
             )
             raise InputError(

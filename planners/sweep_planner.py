@@ -16,6 +16,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from hrsnake_env.arguments import length_text, place_text
 from planners.clock import now
 from planners.corners import critical_corners
 from planners.kernels import sweep as kernel
@@ -292,15 +293,16 @@ def _failed(query: Query, geometry: Geometry, track: Track | None, timings: dict
         deepest = least_depth(geometry.maze, starts, heading, farthest - heading, length)
     what = " A single link could turn there; the track must be free for those that follow on it, too."
     if deepest is not None:
-        depth, (x_wall, y_wall) = deepest
+        depth, place = deepest
         what = (
             f" To turn as the path does, its link would get at least {depth:.3g} {query.maze.units} deep "
-            f"into the wall at ({x_wall:.1f}, {y_wall:.1f})."
+            f"into the wall at {place_text(place, query.maze.size)}."
         )
     return Candidate(
         status=status,
-        reason=f"With the tip at ({x:.1f}, {y:.1f}) {query.maze.units}, {path.s[track.index]:.1f} along the "
-        f"path, {why}, in every way tried to take the corners before it.{what}",
+        reason=f"With the tip at {place_text((x, y), query.maze.size)} {query.maze.units}, "
+        f"{length_text(path.s[track.index], query.maze.size)} along the path, {why}, in every way "
+        f"tried to take the corners before it.{what}",
         failure=Failure(
             place=(x, y),
             path_position=float(path.s[track.index]),

@@ -14,6 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from hrsnake_env.arguments import length_text, place_text
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.contacts import PINCH_TOLERANCE, PinchReport
 from hrsnake_env.maze import Maze
@@ -148,9 +149,9 @@ def failure_rows(world: World, result: PlanningResult | SpatialResult) -> Rows:
     failure, units = result.failure, world.units
     if failure is None:
         return
-    yield "place", f"({', '.join(f'{value:.1f}' for value in failure.place)}) {units}"
+    yield "place", f"{place_text(failure.place, world.size)} {units}"
     if failure.path_position is not None:
-        yield "along the path", f"{failure.path_position:.1f} {units} from the base"
+        yield "along the path", f"{length_text(failure.path_position, world.size)} {units} from the base"
     if failure.link is not None:
         yield "link", "the one at the tip" if failure.link == 0 else f"{failure.link} behind the tip's"
     if failure.wall is not None:

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hrsnake_env.arguments import place_text
 from planners.clock import now
 from planners.feeding import feed, motion_of
 from planners.inset import inset_maze
@@ -442,7 +443,8 @@ def _unsolved(track: _Track, scene: Scene, query: Query, timings: Mapping[str, f
     late = " when time ran out" if query.late else ""
     return Candidate(
         status=PlanningStatus.OUT_OF_TIME if query.late else PlanningStatus.DEAD_END,
-        reason=f"The joint track is not free near ({x:.1f}, {y:.1f}) {scene.maze.units}{late}: {why}.",
+        reason=f"The joint track is not free near {place_text((x, y), scene.maze.size)} {scene.maze.units}"
+        f"{late}: {why}.",
         failure=Failure(
             place=(x, y), path_position=path_position, depth=depth, wall=wall_nearest_to(query.maze, (x, y))
         ),

@@ -1,5 +1,6 @@
 """Degenerate geometry is refused in one sentence or answered right, wherever it lies and however large."""
 
+import re
 import warnings
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from shapely.geometry import Polygon
 
 from benchmarks.trust.degenerate import look_everywhere
+from hrsnake_env.arguments import length_text
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
@@ -106,6 +108,24 @@ def test_a_maze_comes_back_from_its_file_with_the_same_walls():
     assert (Maze.from_geojson(maze.to_geojson()).walls == maze.walls).all()
 
 
+@pytest.mark.parametrize("planner", ["track", "sweep", "beam"])
+@pytest.mark.parametrize(("scale", "offset"), [(1e-3, 0.0), (1e-5, 3.0), (1.0, 0.0), (1e3, 0.0)])
+def test_a_reason_tells_places_as_finely_as_the_maze_is_small(planner, scale, offset):
+    maze = placed(Maze.load("fig19"), scale, offset)
+    result = plan(maze, ArmSpec(link_length=500.0 * scale), planner)
+    told = re.search(r"\(([-\d.]+), ([-\d.]+)\)", result.reason)
+    off = np.array([float(figure) for figure in told.groups()]) - result.place
+    if "seen from the base" in result.reason:
+        off += maze.base_pose[:2]
+    assert np.abs(off).max() <= 1e-4 * maze.size
+
+
+@pytest.mark.parametrize("size", [1e-30, 1e-9, 2e-3, 1.0, 2e3, 9.99e5, 1e30])
+@pytest.mark.parametrize("share", [-1.0, -0.123456, -1e-6, 0.0, 1e-3, 0.5, 7.7])
+def test_a_length_is_told_to_a_ten_thousandth_of_the_size(size, share):
+    assert abs(float(length_text(share * size, size)) - share * size) <= 1e-4 * size
+
+
 def test_points_on_a_straight_wall_make_no_walls():
     x = np.linspace(-0.05, 3.0, 10_000)
     ring = [*zip(x, np.full(x.size, -0.5), strict=True), (3.0, 0.5), (-0.05, 0.5)]
@@ -133,6 +153,15 @@ def test_no_wall_is_a_point_in_link_lengths_either():
     assert plan(maze, ArmSpec(link_length=1.3), "track").solved
 
 
+@pytest.mark.parametrize("scale", [1e-55, 1e-12, 1e-6, 1.0, 1e12, 1e55])
+def test_corridors_have_the_same_shape_in_all_units(scale):
+    bend = np.array([(0.0, 0.0), (0.0, 913.7), (731.9, 1204.1)])
+    wanted = Maze.from_corridors(bend, 217.3, base_offset=5.0)
+    maze = Maze.from_corridors(bend * scale, 217.3 * scale, base_offset=5.0 * scale)
+    assert maze.walls == pytest.approx(wanted.walls * scale, rel=1e-9, abs=1e-9 * wanted.size * scale)
+    assert plan(maze, ArmSpec(link_length=200.0 * scale)).solved
+
+
 def test_small_pieces_of_walls_hardly_change_the_width_of_the_passage():
     x = np.linspace(-0.05, 3.0, 3_000)
     rough = [*zip(x, -0.5 - 1e-3 * (np.arange(x.size) % 2), strict=True), (3.0, 0.5), (-0.05, 0.5)]
@@ -148,6 +177,20 @@ def test_small_pieces_of_walls_hardly_change_the_width_of_the_passage():
         lambda: Maze.from_corridors([(0, 0), (0, 900)], [200.0, 300.0]),
         lambda: Maze.from_corridors([(0, 0), (0, 900)], 200.0, base_offset=float("inf")),
         lambda: Maze.from_corridors([(0, 0), (0, 900)], 200.0, base_offset="near"),
+        lambda: Maze.from_corridors(None, 200.0),
+        lambda: Maze.from_corridors([[(0, 0), (0, 900)], ["away"]], 200.0),
+        lambda: Maze.from_corridors([(0, 0), (0, True)], 200.0),
+        lambda: Maze.from_corridors([(0, 0), (0, "900")], 200.0),
+        lambda: Maze.from_corridors([(0, 0), (0, 900)], True),
+        lambda: Maze.from_corridors([(0, 0), (0, 900)], [True]),
+        lambda: Maze.from_corridors([(0, 0), (0, 900)], 200.0, goal=(True, 800)),
+        lambda: Maze.from_corridors([(0, 0), (0, 900)], 200.0, goal_radius=True),
+        lambda: Maze.from_corridors([(0, 0), (0, 900)], 200.0, base_offset=True),
+        lambda: Maze.from_corridors([(0, 0), (0, 1e160)], 1e159),
+        lambda: Maze.from_corridors([(0, 0), (0, 1e-160)], 1e-161, base_offset=1e-162),
+        lambda: corridor(free_space=shapely.box(-1e160, -1e160, 1e160, 1e160)),
+        lambda: corridor(base_pose=(0, 0, False)),
+        lambda: corridor(goal=("2.5", 0)),
         lambda: corridor(goal_radius="small"),
         lambda: corridor(goal_radius=None),
         lambda: corridor(goal=(3.0, 0.0)),

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hrsnake_env.arguments import place_text
 from planners.clock import now
 from planners.kernels import field_steps as kernel
 from planners.kernels.types import FloatArray
@@ -205,7 +206,7 @@ def _way_left(outcome: _Outcome, query: Query, geometry: Geometry) -> float:
 
 def _failed(query: Query, outcome: _Outcome, geometry: Geometry, start: float) -> Candidate:
     """Say where the best attempt ended, and why."""
-    x, y = place = _tip(outcome, query)
+    place = _tip(outcome, query)
     units, feed = query.maze.units, float(outcome.run.state[0])
     k = max(math.ceil(feed) - 1, 0)
     joints = query.maze.base_pose[:2] + query.arm.link_length * outcome.run.points[k::-1]
@@ -218,7 +219,7 @@ def _failed(query: Query, outcome: _Outcome, geometry: Geometry, start: float) -
         why = "time was over"
     return Candidate(
         status=PlanningStatus.OUT_OF_TIME if outcome.late else PlanningStatus.DEAD_END,
-        reason=f"With the tip at ({x:.1f}, {y:.1f}) {units}, {why}.",
+        reason=f"With the tip at {place_text(place, query.maze.size)} {units}, {why}.",
         failure=Failure(
             place=place,
             path_position=geometry.path.length - _way_left(outcome, query, geometry),

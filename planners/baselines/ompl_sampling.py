@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hrsnake_env.arguments import place_text
 from hrsnake_env.arm import ArmSpec
 from hrsnake_env.errors import InputError
 from hrsnake_env.maze import Maze
@@ -151,7 +152,7 @@ def _plan(query: Query, algorithm: str, deadline: float) -> Candidate:
         clock.append(now())
         if not goals:
             _count(timings, clock)
-            return _no_goal_states(farthest, clock[-1] > deadline, timings)
+            return _no_goal_states(query.maze, farthest, clock[-1] > deadline, timings)
         path = _path(arm, goals, algorithm, query, min(patience, deadline - clock[-1]), rng)
         clock.append(now())
         if path is not None:
@@ -183,13 +184,13 @@ def _count(timings: dict[str, float], clock: list[float]) -> None:
         timings[stage] = timings.get(stage, 0.0) + seconds
 
 
-def _no_goal_states(farthest: FloatArray, late: bool, timings: dict[str, float]) -> Candidate:
+def _no_goal_states(maze: Maze, farthest: FloatArray, late: bool, timings: dict[str, float]) -> Candidate:
     """Say that no whole arm at the goal could be grown."""
     x, y = (float(value) for value in farthest[-1])
     return Candidate(
         status=PlanningStatus.OUT_OF_TIME if late else PlanningStatus.DEAD_END,
         reason=f"No whole arm could be grown to the goal{' in time' if late else ''}: the farthest ends at "
-        f"({x:.1f}, {y:.1f}).",
+        f"{place_text((x, y), maze.size)} {maze.units}.",
         failure=Failure(place=(x, y), joints=farthest),
         timings=timings,
     )

@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from hrsnake_env.arguments import place_text
 from planners.clock import now
 from planners.feeding import LATE, Feeding, feed, motion_of
 from planners.kernels import feeding as kernel
@@ -65,7 +66,7 @@ def plan_path_following(query: Query) -> Candidate:
         x, y = (float(value) for value in fed.poses[pose, -1])
         return Candidate(
             status=PlanningStatus.OUT_OF_TIME if fed.ending == LATE else PlanningStatus.DEAD_END,
-            reason=f"With the tip at ({x:.1f}, {y:.1f}) {maze.units}, {why}.",
+            reason=f"With the tip at {place_text((x, y), maze.size)} {maze.units}, {why}.",
             failure=Failure(place=(x, y), joints=fed.poses[pose]),
             timings={**geometry.timings, "plan": clock[1] - clock[0]},
         )

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from hrsnake_env.arguments import place_text
 from hrsnake_env.maze import Maze
 from planners.clock import now
 from planners.feeding import LATE, feed, motion_of
@@ -133,7 +134,8 @@ def _dead_end(query: Query, geometry: Geometry, begin: float, stuck: Stuck, late
     x, y = (float(value) for value in stuck.joints[-1])
     return Candidate(
         status=PlanningStatus.OUT_OF_TIME if late else PlanningStatus.DEAD_END,
-        reason=f"{before}With the tip at ({x:.1f}, {y:.1f}) {geometry.maze.units}, {stuck.why}.",
+        reason=f"{before}With the tip at {place_text((x, y), geometry.maze.size)} {geometry.maze.units}, "
+        f"{stuck.why}.",
         failure=Failure(place=(x, y), wall=wall_nearest_to(query.maze, (x, y)), joints=stuck.joints),
         timings=_timings(geometry, begin),
     )

@@ -140,5 +140,5 @@ def kind_of(data: Any) -> str:
 
 
 def point_text(point: Sequence[float] | FloatArray) -> str:
-    """Write a point as (x, y, z)."""
-    return "(" + ", ".join(f"{value:g}" for value in point) + ")"
+    """Write a point as (x, y, z), as people gave it: all digits that are not rounding."""
+    return "(" + ", ".join(f"{value:.12g}" for value in point) + ")"

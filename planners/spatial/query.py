@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hrsnake_env.arguments import place_text
 from hrsnake_env.arm import ArmSpec, FloatArray
 from planners.clock import now
 from planners.problem import PlanningStatus, Progress, ValidationReport
-from planners.spatial.entries import point_text
 from planners.spatial.path import Path, global_path
 from planners.spatial.potential import laplace_potential
 from planners.spatial.problem import SpatialCandidate, SpatialMotion
@@ -62,7 +62,7 @@ class SpatialQuery:
 
     def text(self, place: ArrayLike) -> str:
         """Write a place for people."""
-        return point_text(np.asarray(place) + self.origin)
+        return place_text(np.asarray(place) + self.origin, self.workspace.size)
 
     def obstacle_text(self, number: int) -> str:
         """Write which obstacle is meant."""
