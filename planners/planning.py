@@ -169,6 +169,7 @@ def _asked(
                 proof = f"No rod of {arm.link_length:g} {maze.units} passes: this is proved."
             else:
                 result = hearing.first_solved(further_questions(query, rod.path))
+        hearing.late = query.late and not proof
     if result is not None:
         return result
     if hearing.shortage is not None:
@@ -185,6 +186,7 @@ class _Hearing:
         self.attempts: list[Attempt] = []
         self.failures: list[PlanningResult] = []
         self.shortage: InputError | None = None
+        self.late = False
 
     def first_solved(self, questions: Iterator[Question]) -> PlanningResult | None:
         """Return the first valid answer."""
@@ -213,7 +215,7 @@ class _Hearing:
         With a `proof`, that no planner can have a motion.
         """
         result = min(self.failures, key=_depth)
-        late = any(attempt.status is PlanningStatus.OUT_OF_TIME for attempt in self.attempts)
+        late = self.late or any(attempt.status is PlanningStatus.OUT_OF_TIME for attempt in self.attempts)
         if proof:
             result = dataclasses.replace(
                 result, status=PlanningStatus.IMPOSSIBLE, reason=f"{proof} {result.reason}"

@@ -224,7 +224,6 @@ def test_without_any_motion_the_first_reason_is_told():
     trials = [Stuck(why=why, joints=joints) for why in ("a joint would jump", "another one would")]
     candidate = best_of(query, query.geometry, trials)
     assert (
-        candidate.status is PlanningStatus.DEAD_END
-        and "(0.0, 435.0) px, a joint would jump." in candidate.reason
+        candidate.status is PlanningStatus.DEAD_END and "(0, 435) px, a joint would jump." in candidate.reason
     )
     assert candidate.failure.place == (0.0, 435.0)

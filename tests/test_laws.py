@@ -90,7 +90,7 @@ def test_a_maze_scaled_by_a_power_of_two_has_the_same_plan_digit_by_digit(solved
     for case, result in solved[:3]:
         similarity = Similarity(scale=2.0**-7)
         again, _ = laws.timed_plan(similarity.case(case), "auto", 30.0 * BUDGET)
-        laws.digit_by_digit(result, again, similarity)
+        laws.digit_by_digit(case, result, again, similarity)
 
 
 def test_a_motion_is_valid_in_whatever_order_the_walls_are_listed(solved):
@@ -159,7 +159,7 @@ def test_where_time_ends_while_poses_are_made_the_result_says_so(planner, monkey
         return now[0]
 
     case = laws.Case(kind="serpentine", maze=serpentine(4), arm=ArmSpec(link_length=100.0))
-    monkeypatch.setattr("planners.feeding.now", clock)
+    monkeypatch.setattr("time.perf_counter", clock)
     result = plan(case.maze, case.arm, planner, time_budget=2.0, explain=False)
     assert result.status is PlanningStatus.OUT_OF_TIME
     laws.says_why(case, planner, result)
@@ -227,3 +227,33 @@ def test_files_hold_whatever_motions_are_made(solved, tmp_path, monkeypatch):
     monkeypatch.setattr("planners.problem.MOTION_BYTES", taken)
     with pytest.raises(InputError):
         Motion.load(path)
+
+
+def test_where_time_ends_before_the_other_ways_are_tried_auto_says_so(monkeypatch):
+    now, clock, beam = [0.0], time.perf_counter, PLANNERS["beam"]
+
+    def slow(query):
+        candidate = beam(query)
+        now[0] = 1000.0
+        return candidate
+
+    monkeypatch.setitem(PLANNERS, "beam", slow)
+    monkeypatch.setattr("planners.query.time.perf_counter", lambda: clock() + now[0])
+    result = plan(fig19(), ArmSpec(link_length=440.0), time_budget=100.0, explain=False)
+    assert [attempt.planner for attempt in result.attempts][-1] == "beam"
+    assert result.status is PlanningStatus.OUT_OF_TIME
+
+
+def test_goal_states_are_looked_at_as_long_as_there_is_time(monkeypatch):
+    from planners.baselines.goal_states import _roomiest
+
+    class Arm:
+        looked = 0
+
+        def room(self, state, moves):
+            self.looked += 1
+            return 1
+
+    arm, states = Arm(), [np.zeros(3)] * 9
+    kept = _roomiest(arm, states, 4, np.random.default_rng(0), time.perf_counter())
+    assert arm.looked == len(kept) == 1

@@ -5,7 +5,8 @@ in each maze, and one other planner in turn. What must hold, and what may come
 out otherwise:
 
 - A motion is valid in the maze that is moved, turned, mirrored or scaled with it, and with far walls.
-- A maze scaled by a power of two has the same plan, digit by digit: no length is absolute.
+- A maze scaled by a power of two has the same plan, digit by digit, of thick links to
+  1e-9 link lengths: no length is absolute.
 - Turned, mirrored or shifted, a maze may have another plan, or none: the grid of the potential is along x and
   y, and rounding is another. So it may where the walls are listed in another order, as sums then round
   otherwise: mostly by 1e-14 link lengths, rarely so that another planner of `auto` is the first to succeed.
@@ -90,7 +91,7 @@ def one_case(seed: int, number: int, tally: Tally, folder: Path) -> None:
         result, seconds = answer
         tally.seconds.append(seconds)
         tally.statuses[f"{'auto' if planner == 'auto' else 'others'}: {result.status}"] += 1
-        tally.check(number, "time", laws.on_time, seconds, TIME_BUDGET)
+        tally.check(number, "time", laws.on_time, seconds, TIME_BUDGET, planner)
         tally.check(number, "reason", laws.says_why, case, planner, result)
         if result.motion is not None:
             tally.check(number, "saved", laws.valid_when_saved, case, result.motion, folder / f"{number}.npz")
@@ -132,10 +133,10 @@ def one_case(seed: int, number: int, tally: Tally, folder: Path) -> None:
     ):
         answer = tally.check(number, "exception", laws.timed_plan, other, "auto", TIME_BUDGET)
         if answer is not None:
-            tally.check(number, "time", laws.on_time, answer[1], TIME_BUDGET)
+            tally.check(number, "time", laws.on_time, answer[1], TIME_BUDGET, law)
             tally.seconds.append(answer[1])
             if law == "scaled plan":
-                tally.check(number, law, laws.digit_by_digit, solved, answer[0], twofold)
+                tally.check(number, law, laws.digit_by_digit, case, solved, answer[0], twofold)
                 continue
             what = {"moved plan": str(similarity), "far walls": walls.__name__}.get(law, law)
             tally.check(number, law, laws.still_solved, solved, answer[0], what)

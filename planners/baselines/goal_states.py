@@ -83,7 +83,9 @@ def grown_goal_states(
         states = [_state(chains, int(joint)) for joint in rng.permutation(there)[:POOL]]
         states = [state for state in states if arm.is_clear(state)]
         if states:
-            return _roomiest(arm, states, number, rng), _points(chains, int(there[0])) * arm.link_length
+            return _roomiest(arm, states, number, rng, deadline), _points(
+                chains, int(there[0])
+            ) * arm.link_length
         if now() > deadline:
             break
         chosen = _chosen(chains, joints, rng)
@@ -141,10 +143,14 @@ def _state(chains: Chains, joint: int) -> FloatArray:
 
 
 def _roomiest(
-    arm: FedArm, states: list[FloatArray], number: int, rng: np.random.Generator
+    arm: FedArm, states: list[FloatArray], number: int, rng: np.random.Generator, deadline: float
 ) -> list[FloatArray]:
-    """Choose the states around which the arm is free in most directions."""
+    """Choose the states around which the arm is free in most directions, of those looked at in time."""
     moves = rng.normal(size=(MOVES, len(states[0])))
     moves *= MOVE / np.linalg.norm(moves, axis=1, keepdims=True)
-    rooms = [arm.room(state, moves) for state in states]
+    rooms: list[int] = []
+    for state in states:
+        if rooms and now() > deadline:
+            break
+        rooms.append(arm.room(state, moves))
     return [states[k] for k in np.argsort(rooms)[::-1][:number]]
