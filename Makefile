@@ -5,7 +5,7 @@ OLD := .venv-oldest
 INPUTS := pyproject.toml constraints.txt
 MINORS := 12 13
 CORE := tests/test_env.py tests/test_maze.py tests/test_planning.py tests/test_validation.py
-CAMPAIGNS := mazes agreement spatial_agreement kernel_twins degenerate fuzz_maps fuzz_files kills ctrl_c disk load
+CAMPAIGNS := mazes agreement spatial_agreement kernel_twins kernels_of_tracks degenerate fuzz_maps fuzz_files kills ctrl_c disk load
 
 .PHONY: demo test oldest pythons audit trust notebooks docs docs-pictures kernels lint types contracts check format clean
 
